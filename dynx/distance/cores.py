@@ -1,6 +1,7 @@
 """Convex shapes as a core and a radius: every shape is the set of points at most `radius` from its core.
 
-A ball is a point with a radius, a capsule a segment with one; boxes, cylinders and hulls have radius 0. The
+A ball is a point with a radius, a capsule a segment with one; boxes, cylinders,
+ellipsoids and hulls have radius 0. The
 distance of two shapes is that of their cores less both radii, also where the shapes overlap and their cores
 do not, so that rounded surfaces need no approximation.
 
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.errors import ArgumentError, ShapeError, shown
-from dynx.model.geometry import Box, Capsule, Cylinder, Mesh, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere
 from dynx.model.numbers import MAX_MAGNITUDE, checked_array
 from dynx.spatial.plain import Vector3
 from dynx.spatial.scalar import Floats
@@ -37,7 +38,7 @@ class Hull:
         object.__setattr__(self, "points", np.array(points, dtype=np.float64))
 
 
-ConvexShape = Box | Sphere | Cylinder | Capsule | Mesh | Hull
+ConvexShape = Box | Sphere | Cylinder | Capsule | Ellipsoid | Mesh | Hull
 """Bounded convex shapes; a mesh stands for its convex hull."""
 
 
@@ -162,6 +163,44 @@ class CylinderCore(Core):
         return np.asarray(self.p + points @ self.R.T)
 
 
+class EllipsoidCore(Core):
+    """An ellipsoid."""
+
+    def __init__(self, radii: Floats) -> None:
+        super().__init__(0.0, float(radii.max()))
+        self._radii = radii
+
+    def place(self, R: Floats, p: Vector3) -> Core:
+        super().place(R, p)
+        self._scaled = R * self._radii
+        self._axes: list[list[float]] = self._scaled.T.tolist()
+        return self
+
+    def support(self, n: Vector3) -> Vector3:
+        """Return the point of the ellipsoid, the image of the unit ball, that is farthest along n."""
+        a, b, c = n
+        weights = [a * x + b * y + c * z for x, y, z in self._axes]
+        length = math.hypot(*weights)
+        x, y, z = self.p
+        if length > 0.0:
+            for weight, (ex, ey, ez) in zip(weights, self._axes, strict=True):
+                share = weight / length
+                x, y, z = x + share * ex, y + share * ey, z + share * ez
+        return x, y, z
+
+    def supports(self, n: Floats) -> Floats:
+        weights = n @ self._scaled
+        lengths = np.linalg.norm(weights, axis=1, keepdims=True)
+        return np.asarray(self.p + weights / np.where(lengths > 0.0, lengths, np.inf) @ self._scaled.T)
+
+
+def _core_of_ellipsoid(shape: Ellipsoid) -> Core:
+    """Return the core of an ellipsoid; one with equal half axes is a ball, of any depth in closed form."""
+    if len(set(shape.radii)) == 1:
+        return PointCore(shape.radii[0], 0.0)
+    return EllipsoidCore(np.array(shape.radii))
+
+
 class HullCore(Core):
     """The convex hull of points."""
 
@@ -212,10 +251,12 @@ def core_of(shape: object, name: str = "a shape") -> Core:
         return BoxCore(0.5 * np.array(shape.size))
     if isinstance(shape, Cylinder):
         return CylinderCore(shape.radius, 0.5 * shape.length)
+    if isinstance(shape, Ellipsoid):
+        return _core_of_ellipsoid(shape)
     if isinstance(shape, Mesh):
         return HullCore(shape.hull[0])
     if isinstance(shape, Hull):
         return HullCore(shape.points)
     raise ArgumentError(
-        f"{name} is {shown(shape)}; wanted a Box, Sphere, Cylinder, Capsule, Mesh, Hull or Plane"
+        f"{name} is {shown(shape)}; wanted a Box, Sphere, Cylinder, Capsule, Ellipsoid, Mesh, Hull or Plane"
     )

@@ -26,6 +26,7 @@ from dynx.model.geometry import (
     Capsule,
     Collision,
     Cylinder,
+    Ellipsoid,
     Geometry,
     LinkGeometry,
     Mesh,
@@ -301,8 +302,8 @@ def _shape_difference(mine: Visual | Collision, theirs: Visual | Collision) -> s
     if isinstance(a, Mesh) and isinstance(b, Mesh):
         if not _same_mesh(a, b):
             return "mesh"
-    elif isinstance(a, Box | Sphere | Cylinder | Capsule):
-        assert isinstance(b, Box | Sphere | Cylinder | Capsule)
+    elif isinstance(a, Box | Sphere | Cylinder | Capsule | Ellipsoid):
+        assert isinstance(b, Box | Sphere | Cylinder | Capsule | Ellipsoid)
         if not _close(_sizes(b), _sizes(a)):
             return "size"
     if isinstance(mine, Visual) and isinstance(theirs, Visual):
@@ -312,7 +313,9 @@ def _shape_difference(mine: Visual | Collision, theirs: Visual | Collision) -> s
     return ""
 
 
-def _sizes(shape: Box | Sphere | Cylinder | Capsule) -> Floats:
+def _sizes(shape: Box | Sphere | Cylinder | Capsule | Ellipsoid) -> Floats:
+    if isinstance(shape, Ellipsoid):
+        return np.array(shape.radii)
     if isinstance(shape, Box):
         return np.array(shape.size)
     return np.array([shape.radius] if isinstance(shape, Sphere) else [shape.radius, shape.length])

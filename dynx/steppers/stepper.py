@@ -91,6 +91,10 @@ class Stepper(ABC):
     `dynx.world.World` computes these joint dynamics outside of the engine, where they are exact; otherwise
     its notes name them."""
 
+    replaced_shapes: ClassVar[Mapping[type, str]] = {}
+    """Classes of shapes that the engine collides as others, each with the other and its deviation as a noun
+    phrase; the notes of a world name them."""
+
     contact_law: ClassVar[str] = "contacts of its own"
     """Laws of contacts and joint limits of the engine, as a noun phrase."""
 

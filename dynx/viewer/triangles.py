@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.files.cache import keep, read_cached, source_hash
-from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.model.geometry.mesh_reading import Surface
 from dynx.spatial.scalar import Floats
 from dynx.viewer.library import SIMPLIFY_VERSION
@@ -296,6 +296,9 @@ def _primitive(shape: Shape) -> Triangles:
         return _box(np.array(shape.size))
     if isinstance(shape, Sphere):
         return _revolved(*_arc(shape.radius, 0.0))
+    if isinstance(shape, Ellipsoid):
+        ball = _primitive(Sphere(1.0))
+        return Triangles.of(ball.vertices * np.array(shape.radii), ball.faces)
     if isinstance(shape, Capsule):
         return _revolved(*_arc(shape.radius, 0.5 * shape.length))
     if isinstance(shape, Cylinder):

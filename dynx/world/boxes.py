@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.rbd.kinematics import Poses, body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
@@ -63,6 +63,8 @@ def shape_box(shape: Shape, T: Floats) -> Corners:
         reach = np.full(3, shape.radius)
     elif isinstance(shape, Capsule):
         reach = shape.radius + np.abs(R[:, 2]) * shape.length / 2
+    elif isinstance(shape, Ellipsoid):
+        reach = np.linalg.norm(R * np.array(shape.radii), axis=1)
     else:
         assert isinstance(shape, Cylinder)
         across = np.hypot(R[:, 0], R[:, 1])

@@ -161,12 +161,27 @@ def _vector(values: Vector) -> str:
 
 
 def notes_on_engine(engine: Stepper) -> Iterator[str]:
-    """Yield one sentence for each coefficient of contact that the engine does not have, for a long step, and
-    for each robot without collision shapes: they hold at every state."""
+    """Yield one sentence for each coefficient of contact and shape that the engine does not have, for a long
+    step, and for each robot without collision shapes: they hold at every state."""
     yield from map(str, inexact_materials(engine))
+    yield from _replaced_shapes(engine)
     if engine.dt > LONG_STEP:
         yield f"a step of {engine.dt:g} s is longer than {LONG_STEP:g} s: bodies may pass through one another"
     yield from _robots_without_shapes(engine.layout)
+
+
+def _replaced_shapes(engine: Stepper) -> Iterator[str]:
+    """Yield each kind of shape that the engine collides as another, and the parts that have it."""
+    for kind, other in engine.replaced_shapes.items():
+        parts = [
+            shown(collider.name)
+            for collider in engine.layout.colliders
+            if any(isinstance(each.shape, kind) for each in collider.shapes)
+        ]
+        if parts:
+            more = f" and {len(parts) - 3} more parts" if len(parts) > 3 else ""
+            first = f"{', '.join(parts[:3])}{more}"
+            yield f"{shown(engine.name)} has no {kind.__name__}: it collides {first} as {other}"
 
 
 def _robots_without_shapes(layout: Layout) -> Iterator[str]:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from dynx.distance import ConvexShape, Distance, Hull, distance, separation, support
-from dynx.model.geometry import Box, Capsule, Cylinder, Plane, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies.geometry import poses, unit_vectors
 from tests.distance.shapes import KINDS, point_distance, random_pose, random_shape, shapes
@@ -57,7 +57,7 @@ def check_certificate(found: Distance, a: ConvexShape, T_a: Floats, b: ConvexSha
 def check_inside(shape: ConvexShape, T: Floats, point: Floats) -> None:
     """Check that a point is in a shape."""
     if not isinstance(shape, Hull):
-        assert isinstance(shape, Sphere | Box | Cylinder | Capsule)
+        assert isinstance(shape, Sphere | Box | Cylinder | Capsule | Ellipsoid)
         assert point_distance(shape, T, point) <= ROUNDING
         return
     for direction in np.random.default_rng(0).normal(size=(30, 3)):

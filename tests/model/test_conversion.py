@@ -20,6 +20,7 @@ from dynx.model.geometry import (
     Box,
     Capsule,
     Collision,
+    Ellipsoid,
     Geometry,
     LinkGeometry,
     Mesh,
@@ -243,10 +244,11 @@ def test_notes_of_one_kind_are_one_note(to: Format, count: int) -> None:
 
 
 def test_what_urdf_cannot_say_is_noted() -> None:
-    model = arm(LinkGeometry(collisions=(Collision(Capsule(0.1, 0.2)),)))
+    shapes = Collision(Capsule(0.1, 0.2)), Collision(Ellipsoid((0.1, 0.2, 0.3)))
+    model = arm(LinkGeometry(collisions=shapes))
     changed = of_joint(model.with_gravity((0.0, 0.0, -1.0)), dynamics=JointDynamics(armature=0.1))
     notes = " ".join(convert(dynx.load(changed, lock={"j": 0.1}), "urdf").notes)
-    for word in ("gravity", "'tip'", "'j'", "armature", "<capsule>"):
+    for word in ("gravity", "'tip'", "'j'", "armature", "<capsule>", "<ellipsoid>"):
         assert word in notes
     assert convert(arm(), "urdf").notes[0].startswith("Added frames")
     assert "freely" in convert(model.with_base("floating"), "urdf").notes[0]

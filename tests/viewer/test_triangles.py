@@ -13,7 +13,17 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import dynx
-from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Shape, Sphere, solid_properties
+from dynx.model.geometry import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HeightField,
+    Mesh,
+    Shape,
+    Sphere,
+    solid_properties,
+)
 from dynx.model.geometry.images import Texture
 from dynx.model.geometry.mesh_reading import Surface
 from dynx.spatial.scalar import Floats
@@ -33,7 +43,13 @@ from dynx.viewer.triangles import (
 )
 from tests.conftest import needs_examples
 
-SOLIDS: list[Shape] = [Box((0.1, 0.2, 0.3)), Sphere(0.4), Cylinder(0.2, 0.5), Capsule(0.1, 0.3)]
+SOLIDS: list[Shape] = [
+    Box((0.1, 0.2, 0.3)),
+    Sphere(0.4),
+    Cylinder(0.2, 0.5),
+    Capsule(0.1, 0.3),
+    Ellipsoid((0.1, 0.3, 0.2)),
+]
 
 
 def volume(triangles: Triangles) -> float:

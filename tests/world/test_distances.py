@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 import dynx
 from dynx import Pose
 from dynx.distance import Hull, distance, support
-from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Sphere
+from dynx.model.geometry import Box, Capsule, Collision, Cylinder, Ellipsoid, HeightField, Mesh, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies.geometry import poses
 from dynx.world import Scene, SceneBody, SceneRobot, World, box, ground, sphere
@@ -19,13 +19,14 @@ from dynx.world.boxes import shape_box
 from tests.distance.shapes import random_pose
 from tests.world.engines import WORLDS
 
-SHAPES: tuple[Box | Cylinder | Sphere | Capsule, ...] = (
+SHAPES: tuple[Box | Cylinder | Sphere | Capsule | Ellipsoid, ...] = (
     Box((0.5, 0.3, 0.2)),
     Cylinder(0.2, 0.4),
     Sphere(0.25),
     Capsule(0.1, 0.5),
     Cylinder(0.3, 0.1),
     Box((0.1, 0.6, 0.4)),
+    Ellipsoid((0.2, 0.1, 0.3)),
 )
 
 

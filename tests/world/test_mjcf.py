@@ -16,7 +16,7 @@ from dynx.cli.shell.main import cli
 from dynx.engines.mujoco import materials
 from dynx.errors import ArgumentError, EngineLimitError, UnknownNameError, UnsupportedFeatureError
 from dynx.model import Inertial, Link
-from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Sphere
+from dynx.model.geometry import Box, Capsule, Collision, Cylinder, Ellipsoid, HeightField, Sphere
 from dynx.spatial.so3 import rotation_from_quat, skew
 from dynx.steppers.registry import world_class
 from dynx.world import (
@@ -158,13 +158,13 @@ def test_names_are_escaped() -> None:
 
 def test_every_shape_has_its_size_pose_and_material() -> None:
     material = Material(friction=0.7, torsional_friction=0.02, rolling_friction=0.001, rgba=COLOUR)
-    shapes = (Box((1, 2, 3)), Sphere(0.3), Cylinder(0.2, 0.6), Capsule(0.1, 0.5))
+    shapes = (Box((1, 2, 3)), Sphere(0.3), Cylinder(0.2, 0.6), Capsule(0.1, 0.5), Ellipsoid((0.1, 0.2, 0.3)))
     placed = tuple(Collision(shape, Pose((0.1, 0.2, 0.3), (0.5, 0, 0))) for shape in shapes)
     scene = Scene(
         "s", bodies=(SceneBody("b", placed, mass=1.0, material=material), ground("g", material=material))
     )
     model, data = load(scene)
-    sizes = [[0.5, 1, 1.5], [0.3, 0, 0], [0.2, 0.3, 0], [0.1, 0.25, 0]]
+    sizes = [[0.5, 1, 1.5], [0.3, 0, 0], [0.2, 0.3, 0], [0.1, 0.25, 0], [0.1, 0.2, 0.3]]
     for number, size in enumerate(sizes):
         geom = model.geom(f"b/{number}")
         np.testing.assert_array_equal(geom.size, size)

@@ -24,6 +24,7 @@ from dynx.world import (
     Weld,
     World,
     box,
+    ellipsoid,
     ground,
     read_scene,
     scene_names,
@@ -237,3 +238,15 @@ def test_targets_of_motors_in_steps_are_noted_once_where_they_look_like_degrees(
             "the target of the motors of 'arm': 'shoulder_lift_joint' is at -90 rad, far beyond its limits "
             "-6.283 to 6.283; -90 degrees are -1.5708 rad",
         )
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_an_ellipsoid_rests_on_its_shortest_half_axis_and_bullet_says_what_it_has(engine: str) -> None:
+    lens = ellipsoid("lens", (0.2, 0.3, 0.1), mass=1.0, pose=Pose((0.0, 0.0, 0.11)))
+    with World(Scene("s", bodies=(ground(), lens)), engine) as world:
+        named = [note for note in world.notes if "Ellipsoid" in note]
+        assert (len(named) == 1) == (engine == "pybullet")
+        assert all("'lens' as polyhedra, within 0.2 %" in note for note in named)
+        world.run(1.0)
+        # A polyhedron within 0.2 % of the half axes, and contacts that yield by less than half a millimetre.
+        assert world.state.bodies["lens"].position[2] == pytest.approx(0.1, abs=0.002 * 0.1 + 5e-4)

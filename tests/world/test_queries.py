@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 import dynx
 from dynx import Pose
 from dynx.errors import ShapeError, UnknownNameError
-from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Shape, Sphere
+from dynx.model.geometry import Box, Capsule, Collision, Cylinder, Ellipsoid, HeightField, Shape, Sphere
 from dynx.model.tree import Base
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.world import Scene, SceneBody, SceneRobot, World, box, ground, sphere
@@ -103,7 +103,9 @@ def test_a_ball_rests_on_a_height_field(engine: str) -> None:
     angles,
     angles,
     angles,
-    st.sampled_from([Box((0.2, 0.5, 0.9)), Cylinder(0.3, 0.7), Capsule(0.2, 0.5), Sphere(0.4)]),
+    st.sampled_from(
+        [Box((0.2, 0.5, 0.9)), Cylinder(0.3, 0.7), Capsule(0.2, 0.5), Sphere(0.4), Ellipsoid((0.2, 0.5, 0.9))]
+    ),
 )
 def test_boxes_are_those_of_surface_points(roll: float, pitch: float, yaw: float, shape: Shape) -> None:
     T = np.eye(4)
@@ -126,6 +128,8 @@ def surface(shape: Shape) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     ).reshape(-1, 3)
     if isinstance(shape, Sphere):
         return shape.radius * ball
+    if isinstance(shape, Ellipsoid):
+        return ball * shape.radii
     assert isinstance(shape, Cylinder | Capsule)
     half = np.array([0, 0, shape.length / 2])
     if isinstance(shape, Capsule):

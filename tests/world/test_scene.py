@@ -9,7 +9,7 @@ import pytest
 
 import dynx
 from dynx.errors import ArgumentError, UnknownNameError
-from dynx.model.geometry import Box, Capsule, Cylinder, Mesh, Plane
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane
 from dynx.world import (
     Material,
     Scene,
@@ -19,6 +19,7 @@ from dynx.world import (
     box,
     capsule,
     cylinder,
+    ellipsoid,
     ground,
     mesh,
     sphere,
@@ -127,5 +128,6 @@ def test_ignored_pairs_take_robots_and_groups() -> None:
 def test_bodies_of_one_shape_are_made_by_their_names(tmp_path: Path) -> None:
     assert cylinder("c", 0.1, 0.3, mass=1.0).shapes[0].shape == Cylinder(0.1, 0.3)
     assert capsule("c", 0.1, 0.3).shapes[0].shape == Capsule(0.1, 0.3)
+    assert ellipsoid("e", (0.1, 0.2, 0.3), mass=2.0).shapes[0].shape == Ellipsoid((0.1, 0.2, 0.3))
     file = str(tmp_path / "thing.stl")
     assert mesh("m", file, (1.0, 1.0, -1.0)).shapes[0].shape == Mesh(file, (1.0, 1.0, -1.0))

@@ -44,7 +44,7 @@ from dynx.engines.drake.library import (
 from dynx.engines.drake.materials import APPROXIMATIONS, MODELS, Copies, copies_of, proximity_properties
 from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism
-from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.model.mechanism import ROOT
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
@@ -167,6 +167,8 @@ def drake_shapes(shape: Shape) -> list[object]:
         return [geometry.Cylinder(shape.radius, shape.length)]
     if isinstance(shape, Capsule):
         return [geometry.Capsule(shape.radius, shape.length)]
+    if isinstance(shape, Ellipsoid):
+        return [geometry.Ellipsoid(*shape.radii)]
     if isinstance(shape, Plane):
         return [geometry.HalfSpace()]
     if isinstance(shape, Mesh):

@@ -10,7 +10,7 @@ import numpy as np
 
 from dynx.engines.mujoco.library import mujoco, offscreen_context
 from dynx.errors import EngineError, EngineLimitError
-from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.camera import Camera, Drawing, DrawnShape, DrawnTriangles
@@ -105,6 +105,8 @@ def _geom(shape: Shape | DrawnTriangles) -> tuple[Any, list[float]]:
     if isinstance(shape, Cylinder | Capsule):
         kind = kinds.mjGEOM_CYLINDER if isinstance(shape, Cylinder) else kinds.mjGEOM_CAPSULE
         return kind, [shape.radius, 0.5 * shape.length, 0.0]
+    if isinstance(shape, Ellipsoid):
+        return kinds.mjGEOM_ELLIPSOID, list(shape.radii)
     if isinstance(shape, Plane):
         return kinds.mjGEOM_PLANE, [_GROUND_SIDE, _GROUND_SIDE, 1.0]
     return kinds.mjGEOM_MESH, []

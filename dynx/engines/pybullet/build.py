@@ -35,7 +35,7 @@ from dynx.engines.pybullet.canonical_urdf import (
 )
 from dynx.engines.pybullet.client import BulletClient, Reals
 from dynx.errors import EngineError, EngineLimitError
-from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.spatial.plain import minus_cross, rotate, rotate_back, rotation_rows
 from dynx.spatial.scalar import Floats
@@ -136,7 +136,9 @@ SETTINGS = {
     ),
     "contact_distance": Setting(0.02, "distance [m] below which contact points are kept"),
     "contact_slop": Setting(1e-5, "depth [m] to which a penetration is not removed", most=1.0),
-    "mesh_margin": Setting(0.0, "distance [m] by which the hull of a mesh is enlarged", most=1.0),
+    "mesh_margin": Setting(
+        0.0, "distance [m] by which the hull of a mesh or an ellipsoid is enlarged", most=1.0
+    ),
     "constraint_force": Setting(1e6, "largest force [N] or moment [N m] of welds and points", most=1e12),
     "link_damping": Setting(
         0.0, "damping [1/s] of the motion of every link and body, which Bullet by itself sets to 0.04"
@@ -277,7 +279,7 @@ class ShapeFiles:
         """`flags` are those of Bullet's `loadURDF` for all objects with shapes."""
         self.flags = flags
         self._folder = folder
-        self._files: dict[Mesh, Path] = {}
+        self._files: dict[Mesh | Ellipsoid, Path] = {}
 
     def elements(self, shapes: tuple[PlacedShape, ...], T: Floats) -> list[str]:
         """Return the ``<collision>`` elements of shapes whose owner has the pose T (4, 4) in its link."""
@@ -295,17 +297,18 @@ class ShapeFiles:
         if isinstance(shape, Cylinder | Capsule):
             kind = type(shape).__name__.lower()
             return f'<{kind} radius="{locale_free(shape.radius)}" length="{locale_free(shape.length)}"/>'
-        assert isinstance(shape, Mesh)
+        assert isinstance(shape, Mesh | Ellipsoid)
         return f'<mesh filename="{self._hull_file(shape)}"/>'
 
-    def _hull_file(self, mesh: Mesh) -> str:
-        if mesh not in self._files:
+    def _hull_file(self, shape: Mesh | Ellipsoid) -> str:
+        if shape not in self._files:
             # Of an OBJ file Bullet makes a compound of hulls, whose margin cannot be set.
             path = self._folder / f"hull{len(self._files)}.stl"
-            vertices, faces = mesh.hull
+            # Bullet has no ellipsoid.
+            vertices, faces = shape.hull if isinstance(shape, Mesh) else shape.triangles()
             path.write_bytes(binary_stl(vertices[faces]))
-            self._files[mesh] = path
-        return str(self._files[mesh])
+            self._files[shape] = path
+        return str(self._files[shape])
 
     def block(self) -> Path:
         """Return a URDF file of a fixed box whose upper face stands for the plane z = 0."""
@@ -573,7 +576,7 @@ def set_filters(
     engine = client.engine
     for number, (collider, found) in enumerate(zip(layout.colliders, places, strict=True)):
         options = materials.options(number, settings, dt)
-        if any(isinstance(each.shape, Mesh) for each in collider.shapes):
+        if any(isinstance(each.shape, Mesh | Ellipsoid) for each in collider.shapes):
             options["collisionMargin"] = settings["mesh_margin"]
         for body, link in found:
             client.call(engine.changeDynamics, body, link, **options)

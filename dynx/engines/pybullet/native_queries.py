@@ -14,7 +14,7 @@ from dynx.engines.pybullet.library import bullet
 from dynx.engines.pybullet.stepper import BulletStepper, touching_point
 from dynx.errors import EngineError, EngineLimitError
 from dynx.files.temporary import temporary_folder
-from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
 from dynx.spatial.so3 import quat_from_rotation
@@ -101,7 +101,7 @@ def _visual(engine: ModuleType, drawn: DrawnShape, file: Path) -> dict[str, Any]
         x, y = 0.5 * GROUND_SIDE * np.array([[-1, 1, 1, -1], [-1, -1, 1, 1]])
         corners = np.stack([x, y, np.zeros(4)], axis=1)[[[0, 1, 2], [0, 2, 3]]]
     else:
-        assert isinstance(shape, Mesh | HeightField)
+        assert isinstance(shape, Mesh | HeightField | Ellipsoid)
         vertices, faces = shape.triangles if isinstance(shape, Mesh) else shape.triangles()
         corners = vertices[faces]
         if drawn.painted and isinstance(shape, Mesh) and shape.surface.texture is not None:

@@ -32,6 +32,7 @@ from dynx.engines.pybullet.motors import BulletMotorCommand
 from dynx.engines.pybullet.robot import BulletBody, BulletRobot
 from dynx.engines.silence import silence
 from dynx.files.temporary import temporary_folder
+from dynx.model.geometry import Ellipsoid
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
@@ -146,6 +147,9 @@ class BulletStepper(Stepper):
     inexact: ClassVar[Mapping[Feature, str]] = {
         Feature.DAMPING: "that of the velocity when a step begins, an error of first order in the step",
         Feature.DRY_FRICTION: "solved by iterations, before mimic joints are coupled",
+    }
+    replaced_shapes: ClassVar[Mapping[type, str]] = {
+        Ellipsoid: f"polyhedra, within {Ellipsoid.MESH_DEVIATION * 100:g} % of the half axes"
     }
     native_queries: ClassVar[str] = "dynx.engines.pybullet.native_queries:BulletQueries"
 

@@ -2,7 +2,7 @@
 
 from dynx.model.geometry.links import Appearance, Collision, Geometry, LinkGeometry, Visual
 from dynx.model.geometry.mesh import Mesh
-from dynx.model.geometry.shapes import Box, Capsule, Cylinder, HeightField, Plane, Sphere
+from dynx.model.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HeightField, Plane, Sphere
 from dynx.model.geometry.solids import Shape, SolidProperties, solid_properties
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "Capsule",
     "Collision",
     "Cylinder",
+    "Ellipsoid",
     "Geometry",
     "HeightField",
     "LinkGeometry",

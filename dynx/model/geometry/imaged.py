@@ -14,7 +14,7 @@ from dynx.files.reading import read_file
 from dynx.model.geometry.images import Texture, read_texture
 from dynx.model.geometry.mesh import Faces, Mesh
 from dynx.model.geometry.mesh_reading import Surface, SurfacePart, mesh_file
-from dynx.model.geometry.shapes import Box, Cylinder, Sphere
+from dynx.model.geometry.shapes import Box, Cylinder, Ellipsoid, Sphere
 from dynx.model.geometry.solids import Shape
 from dynx.spatial.scalar import Floats
 
@@ -52,7 +52,7 @@ class ImagedShape(Mesh):
 
 @lru_cache(maxsize=256)
 def imaged_shape(shape: Shape, image: str) -> ImagedShape | None:
-    """Return a mesh, a box, a ball or a cylinder with an image on it; None for another shape, for a mesh
+    """Return a mesh, box, ball, ellipsoid or cylinder with an image on it; None for another shape, for a mesh
     without places in images, and for an image that cannot be read (`image_fault` tells why)."""
     return None if image_fault(shape, image) else ImagedShape(image, shape=shape)
 
@@ -60,7 +60,7 @@ def imaged_shape(shape: Shape, image: str) -> ImagedShape | None:
 @lru_cache(maxsize=256)
 def image_fault(shape: Shape, image: str) -> str:
     """Return the reason why an image of a material is not shown on a shape; empty for one that is."""
-    if not isinstance(shape, Mesh | Box | Sphere | Cylinder):
+    if not isinstance(shape, Mesh | Box | Sphere | Cylinder | Ellipsoid):
         return f"image {shown(os.path.basename(image))} is not shown on a {type(shape).__name__}"
     try:
         _ = ImagedShape(image, shape=shape).surface
@@ -70,8 +70,8 @@ def image_fault(shape: Shape, image: str) -> str:
 
 
 def _primitive(shape: Shape, texture: Texture) -> Surface:
-    """Return the surface of a primitive: each face of a box has the whole image; around a ball and a cylinder
-    it lies once, with its left edge in the direction of x."""
+    """Return the surface of a primitive: each face of a box has the whole image; around a ball, an
+    ellipsoid and a cylinder it lies once, with its left edge in the direction of x."""
     if isinstance(shape, Box):
         signs = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
         # Counter-clockwise from outside, from the lower left corner.
@@ -81,6 +81,12 @@ def _primitive(shape: Shape, texture: Texture) -> Surface:
         faces = np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])])
         uv = np.tile([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], (6, 1))
         return Surface(vertices, faces, None, uv[faces], texture)
+    if isinstance(shape, Ellipsoid):
+        ball, radii = _primitive(Sphere(1.0), texture), np.array(shape.radii)
+        assert ball.normals is not None
+        normals = ball.normals / radii
+        normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+        return ball._replace(vertices=ball.vertices * radii, normals=normals)
     if isinstance(shape, Sphere):
         height = np.linspace(-0.5 * math.pi, 0.5 * math.pi, _SEGMENTS // 2 + 1)
         radii, z = shape.radius * np.cos(height), shape.radius * np.sin(height)

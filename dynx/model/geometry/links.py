@@ -10,11 +10,11 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, UnknownNameError, nearest, shown
 from dynx.model.elements import IDENTITY, Pose, checked_pose
 from dynx.model.geometry.mesh import Mesh
-from dynx.model.geometry.shapes import Box, Capsule, Cylinder, HeightField, Plane, Sphere
+from dynx.model.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HeightField, Plane, Sphere
 from dynx.model.geometry.solids import Shape
 from dynx.model.numbers import colour
 
-_SHAPES = (Box, Sphere, Cylinder, Capsule, Mesh, Plane, HeightField)
+_SHAPES = (Box, Sphere, Cylinder, Capsule, Ellipsoid, Mesh, Plane, HeightField)
 
 Colour = tuple[float, float, float, float]
 

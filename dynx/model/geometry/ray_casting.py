@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.model.geometry.mesh import Mesh
-from dynx.model.geometry.shapes import Box, Capsule, Cylinder, HeightField, Plane, Sphere
+from dynx.model.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HeightField, Plane, Sphere
 from dynx.spatial.scalar import Floats
 
 MAX_PRODUCTS = 2_000_000
@@ -81,6 +81,8 @@ def _solid(shape: object, origins: Floats, directions: Floats) -> Interval:
         for end in (-0.5, 0.5):
             middle = _union(middle, _in_ball(shape.radius, end * shape.length, origins, directions))
         return middle
+    if isinstance(shape, Ellipsoid):
+        return _in_ellipsoid(np.array(shape.radii), origins, directions)
     raise TypeError(f"no rays on a {type(shape).__name__}")
 
 
@@ -120,6 +122,16 @@ def _roots(origins: Floats, directions: Floats, radius: float) -> Interval:
     start = np.where(misses, np.inf, np.where(parallel, -np.inf, start))
     end = np.where(misses, -np.inf, np.where(parallel, np.inf, end))
     return Interval(start, end, *(_unit_points(origins, directions, times) for times in (start, end)))
+
+
+def _in_ellipsoid(radii: Floats, origins: Floats, directions: Floats) -> Interval:
+    """Return where rays are inside an ellipsoid: in coordinates divided by its half axes, a ball."""
+    inside = _roots(origins / radii, directions / radii, 1.0)
+    normals = inside.start_normal / radii, inside.end_normal / radii
+    # A ray that misses may have no point, and a normal of zero.
+    lengths = (np.linalg.norm(each, axis=1, keepdims=True) for each in normals)
+    units = (each / np.where(size > 0.0, size, 1.0) for each, size in zip(normals, lengths, strict=True))
+    return Interval(inside.start, inside.end, *units)
 
 
 def _unit_points(origins: Floats, directions: Floats, times: Floats) -> Floats:

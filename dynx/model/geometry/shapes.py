@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -57,6 +58,53 @@ class Capsule:
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", positive_number("radius of a capsule", self.radius))
         object.__setattr__(self, "length", positive_number("length of a capsule", self.length))
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """An ellipsoid with the half axes `radii` [m] along x, y and z."""
+
+    radii: Vector
+
+    MESH_DEVIATION: ClassVar[float] = 2e-3
+    """Largest distance between the surface and that of `triangles`, relative to the half axes."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radii", positive_numbers("radii of an ellipsoid", self.radii, 3))
+
+    def triangles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return a convex polyhedron near the surface: vertices (n, 3) [m] and triangles (m, 3),
+        counter-clockwise from outside.
+
+        In coordinates divided by the half axes it lies between the balls of the radii 1 - `MESH_DEVIATION`
+        and 1 + `MESH_DEVIATION`.
+        """
+        vertices, faces = _near_unit_ball()
+        return vertices * np.array(self.radii), faces
+
+
+@lru_cache(maxsize=1)
+def _near_unit_ball() -> tuple[np.ndarray, np.ndarray]:
+    """Return a geodesic polyhedron whose vertices are as far outside the unit ball as its faces are inside:
+    an octahedron whose triangles are divided into four, four times."""
+    vertices = np.concatenate([np.eye(3), -np.eye(3)])
+    octants = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
+    faces = np.array(octants)
+    for _ in range(4):
+        edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        used, places = np.unique(edges, axis=0, return_inverse=True)
+        middles = vertices[used].sum(axis=1)
+        ab, bc, ca = (len(vertices) + places.reshape(-1, 3)).T
+        a, b, c = faces.T
+        vertices = np.concatenate([vertices, middles / np.linalg.norm(middles, axis=1, keepdims=True)])
+        corners = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        faces = np.concatenate([np.stack(each, axis=1) for each in corners])
+    normals = np.cross(
+        vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]
+    )
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    inner = np.einsum("ij,ij->i", normals, vertices[faces[:, 0]]).min()
+    return vertices * (2.0 / (1.0 + inner)), faces
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from dynx.errors import UnsupportedFeatureError
 from dynx.model.elements import Joint, JointDynamics
-from dynx.model.geometry import Box, Capsule, Cylinder, Plane, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere
 from dynx.model.geometry.solids import Shape
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import quat_from_rotation
@@ -80,7 +80,7 @@ def joint_attributes(joint: Joint, limits: tuple[float, float], dynamics: JointD
 
 
 def primitive_attributes(shape: Shape) -> dict[str, str]:
-    """Return type and size of a geom that is a box, ball, cylinder, capsule or plane.
+    """Return type and size of a geom that is a box, ball, cylinder, capsule, ellipsoid or plane.
 
     Raises UnsupportedFeatureError for another shape.
     """
@@ -91,6 +91,8 @@ def primitive_attributes(shape: Shape) -> dict[str, str]:
     if isinstance(shape, Cylinder | Capsule):
         kind = "cylinder" if isinstance(shape, Cylinder) else "capsule"
         return {"type": kind, "size": text([shape.radius, 0.5 * shape.length])}
+    if isinstance(shape, Ellipsoid):
+        return {"type": "ellipsoid", "size": text(shape.radii)}
     if isinstance(shape, Plane):
         return {"type": "plane", "size": "0 0 1"}
     raise UnsupportedFeatureError(f"a {type(shape).__name__} is no simple shape of MJCF")

@@ -17,6 +17,7 @@ from dynx.model.geometry import (
     Capsule,
     Collision,
     Cylinder,
+    Ellipsoid,
     HeightField,
     LinkGeometry,
     Mesh,
@@ -26,7 +27,7 @@ from dynx.model.geometry import (
 )
 from dynx.model.geometry.mesh_inertia import mesh_properties
 from dynx.model.geometry.shapes import MAX_HEIGHTS
-from dynx.model.geometry.solids import Shape, SolidProperties, ellipsoid_properties, solid_properties
+from dynx.model.geometry.solids import Shape, SolidProperties, shell_properties, solid_properties
 from dynx.model.mjcf.document import MjcfText
 from dynx.model.xml.reading import Element
 from dynx.spatial.scalar import Floats
@@ -183,10 +184,6 @@ class GeomReader:
             raise reading.unsupported(element, f"{geom.fault}, and the mass of its body follows from it")
         geom = self._fitted(geom)
         shell = reading.flag(element, "shellinertia", geom.what, default=False)
-        if shell and geom.asset is None:
-            raise reading.unsupported(
-                element, f"{geom.what} is hollow (shellinertia), which dynx computes for meshes alone"
-            )
         solid = self._solid(geom, shell)
         if solid.volume <= 0.0:
             raise reading.error(
@@ -319,11 +316,9 @@ class GeomReader:
             raise self._reading.error(asset.element, f"the mesh of {what}: {error}") from None
 
     def _solid(self, geom: Geom, shell: bool) -> SolidProperties:
-        if geom.type == "ellipsoid":
-            return ellipsoid_properties(*geom.size)
         shape, pose = self._shape(geom)
         if geom.asset is None:
-            return solid_properties(shape)
+            return shell_properties(shape) if shell else solid_properties(shape)
         kind = "shell" if shell else geom.asset.inertia
         return self._of_mesh(geom.asset, kind, geom.what).transform(inverse(geom.pose) @ pose)
 
@@ -343,6 +338,8 @@ class GeomReader:
             return Capsule(size[0], 2.0 * size[1]) if size[1] else Sphere(size[0]), geom.pose
         if geom.type == "cylinder":
             return Cylinder(size[0], 2.0 * size[1]), geom.pose
+        if geom.type == "ellipsoid":
+            return Ellipsoid((size[0], size[1], size[2])), geom.pose
         if geom.type == "plane":
             return Plane(), geom.pose
         if geom.type == "hfield":

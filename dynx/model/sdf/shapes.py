@@ -15,6 +15,7 @@ from dynx.model.geometry import (
     Capsule,
     Collision,
     Cylinder,
+    Ellipsoid,
     LinkGeometry,
     Mesh,
     Plane,
@@ -27,7 +28,6 @@ from dynx.model.geometry.solids import (
     Shape,
     SolidProperties,
     cone_properties,
-    ellipsoid_properties,
     inertial_of,
     solid_properties,
 )
@@ -157,6 +157,8 @@ class LinkShapeReader:
             return Cylinder(*self._sizes(element, what)), np.eye(4)
         if tag == "capsule":
             return Capsule(*self._sizes(element, what)), np.eye(4)
+        if tag == "ellipsoid":
+            return Ellipsoid(self._vector(element, "radii", what, 1.0)), np.eye(4)
         if tag == "plane":
             normal = np.array(self._vector(element, "normal", what, 0.0, 0.0, 1.0))
             length = float(np.linalg.norm(normal))
@@ -190,13 +192,11 @@ class LinkShapeReader:
         if shape is None:
             return None
         try:
-            if shape.tag == "ellipsoid":
-                return ellipsoid_properties(*self._vector(shape, "radii", what, 1.0))
             if shape.tag == "cone":
                 return cone_properties(*self._sizes(shape, what))
             if shape.tag == "mesh":
                 return mesh_properties(self._mesh(shape, what), "exact")
-            if shape.tag in ("box", "sphere", "cylinder", "capsule"):
+            if shape.tag in ("box", "sphere", "cylinder", "capsule", "ellipsoid"):
                 return solid_properties(self._shape(shape, what)[0])
         except ArgumentError as error:
             raise reading.error(shape, f"{what}: {error}") from None

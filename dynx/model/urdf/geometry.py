@@ -14,6 +14,7 @@ from dynx.model.geometry import (
     Capsule,
     Collision,
     Cylinder,
+    Ellipsoid,
     Geometry,
     LinkGeometry,
     Mesh,
@@ -29,7 +30,7 @@ from dynx.model.xml.reading import Element, read_xml
 from dynx.model.xml.values import Reading
 
 _OPAQUE = frozenset(["joint", "inertial", "transmission", "gazebo", "sensor", "ros2_control", "contact"])
-_SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh", "plane")
+_SHAPES = ("box", "sphere", "cylinder", "capsule", "ellipsoid", "mesh", "plane")
 
 Placed = TypeVar("Placed", Visual, Collision)
 
@@ -130,6 +131,8 @@ class _ShapeReader:
             return Cylinder(reading.number(shape, "radius", what), reading.number(shape, "length", what))
         if shape.tag == "capsule":
             return Capsule(reading.number(shape, "radius", what), reading.number(shape, "length", what))
+        if shape.tag == "ellipsoid":
+            return Ellipsoid(reading.vector(shape, "radii", what))
         if shape.tag == "mesh":
             return self._mesh(shape, what)
         if shape.tag == "plane":

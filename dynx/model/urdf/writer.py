@@ -15,6 +15,7 @@ from dynx.model.geometry import (
     Capsule,
     Collision,
     Cylinder,
+    Ellipsoid,
     Geometry,
     LinkGeometry,
     Mesh,
@@ -85,6 +86,8 @@ def _shape(shape: Shape, link: str, mesh_path: MeshPath) -> str:
     if isinstance(shape, Cylinder | Capsule):
         tag = "cylinder" if isinstance(shape, Cylinder) else "capsule"
         return f'<{tag} radius="{shape.radius!r}" length="{shape.length!r}"/>'
+    if isinstance(shape, Ellipsoid):
+        return f'<ellipsoid radii="{_finite_numbers(shape.radii)}"/>'
     if isinstance(shape, Plane):
         return '<plane normal="0 0 1"/>'
     if isinstance(shape, Mesh):
@@ -190,9 +193,12 @@ def urdf_notes(tree: Tree) -> Iterator[str]:
                 yield f"The {kind} shapes of link {shown(link.name)} are left out: {fault.message}."
         every: tuple[Visual | Collision, ...] = (*shapes.visuals, *shapes.collisions)
         for each in every:
-            if isinstance(each.shape, Capsule | Plane):
+            if isinstance(each.shape, Capsule | Ellipsoid | Plane):
                 tag = f"<{type(each.shape).__name__.lower()}>"
-                kind = f"{tag} is no shape of URDF, and some readers alone have it"
+                who = (
+                    "dynx alone has it" if isinstance(each.shape, Ellipsoid) else "some readers alone have it"
+                )
+                kind = f"{tag} is no shape of URDF, and {who}"
                 kinds.setdefault(kind, []).append(link.name)
             if isinstance(each.shape, Mesh) and each.shape.fault is not None:
                 kind = f"Meshes are named and not copied: {each.shape.fault.message}"

@@ -20,6 +20,7 @@ from dynx.model.geometry import (
     Capsule,
     Collision,
     Cylinder,
+    Ellipsoid,
     Geometry,
     HeightField,
     LinkGeometry,
@@ -191,6 +192,13 @@ def capsule(name: str, radius: float, length: float, **options: Unpack[BodyOptio
     """Return a body with the shape of a capsule about z [m], whose ends are half balls beyond the length;
     `options` are those of `SceneBody`."""
     return SceneBody(name, Capsule(radius, length), **options)
+
+
+@checks_types
+def ellipsoid(name: str, radii: ArrayLike, **options: Unpack[BodyOptions]) -> SceneBody:
+    """Return a body with the shape of an ellipsoid of these half axes (3,) [m]; `options` are those of
+    `SceneBody`."""
+    return SceneBody(name, Ellipsoid(finite_vector("radii of an ellipsoid", radii)), **options)
 
 
 @checks_types

@@ -26,6 +26,7 @@ from dynx.model.geometry import (
     Capsule,
     Collision,
     Cylinder,
+    Ellipsoid,
     HeightField,
     Mesh,
     Plane,
@@ -87,15 +88,16 @@ class MaterialDocument:
 class ShapeDocument:
     """One shape; exactly one of the keys before `scale` is given.
 
-    `box` has three edge lengths, `cylinder` and `capsule` radius and length, `mesh` a file beside the scene,
-    scaled by `scale`, `heights` the rows of a height field of the extent `size` along x and y. `rgba` is the
-    colour of a visual; without it a visual has that of its body.
+    `box` has three edge lengths, `cylinder` and `capsule` radius and length, `ellipsoid` three half axes,
+    `mesh` a file beside the scene, scaled by `scale`, `heights` the rows of a height field of the extent
+    `size` along x and y. `rgba` is the colour of a visual; without it a visual has that of its body.
     """
 
     box: Vector | None = None
     sphere: float | None = None
     cylinder: Vector | None = None
     capsule: Vector | None = None
+    ellipsoid: Vector | None = None
     plane: Literal[True] | None = None
     mesh: str | None = None
     heights: list[Vector] | None = None
@@ -414,7 +416,7 @@ def _visual(given: ShapeDocument, paths: ScenePaths) -> Visual:
 def _shape(given: ShapeDocument, paths: ScenePaths) -> Collision:
     if given.rgba is not None:
         raise ArgumentError("rgba belongs to visuals; the colour of shapes is that of the material")
-    kinds = ("box", "sphere", "cylinder", "capsule", "plane", "mesh", "heights")
+    kinds = ("box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "heights")
     present = [name for name in kinds if getattr(given, name) is not None]
     if len(present) != 1:
         found = f"it has {' and '.join(present)}" if present else "it has none"
@@ -430,6 +432,8 @@ def _solid(given: ShapeDocument, paths: ScenePaths) -> Shape:
         return Box(finite_vector("size of a box", given.box))
     if given.sphere is not None:
         return Sphere(given.sphere)
+    if given.ellipsoid is not None:
+        return Ellipsoid(finite_vector("radii of an ellipsoid", given.ellipsoid))
     for name, kind in (("cylinder", Cylinder), ("capsule", Capsule)):
         numbers = getattr(given, name)
         if numbers is not None:
@@ -616,6 +620,8 @@ def _shape_document(placed: Collision, paths: ScenePaths) -> ShapeDocument:
         return ShapeDocument(cylinder=[shape.radius, shape.length], pose=pose)
     if isinstance(shape, Capsule):
         return ShapeDocument(capsule=[shape.radius, shape.length], pose=pose)
+    if isinstance(shape, Ellipsoid):
+        return ShapeDocument(ellipsoid=list(shape.radii), pose=pose)
     if isinstance(shape, HeightField):
         heights = [list(row) for row in shape.heights]
         return ShapeDocument(heights=heights, size=list(shape.size), pose=pose)

@@ -16,6 +16,7 @@ from dynx.model.geometry import (
     Box,
     Capsule,
     Cylinder,
+    Ellipsoid,
     HeightField,
     Mesh,
     Plane,
@@ -54,11 +55,15 @@ def test_moments_of_round_shapes_are_those_of_their_points(radius: float, length
     def ball(p: Floats) -> Floats:
         return np.asarray(np.linalg.norm(p, axis=1) < radius)
 
+    def ellipsoid(p: Floats) -> Floats:
+        return np.asarray(np.linalg.norm(p / [radius, length, 0.3], axis=1) < 1.0)
+
     ends = (radius, radius, length / 2 + radius)
     cases: list[tuple[Shape, Callable[[Floats], Floats], tuple[float, float, float]]] = [
         (Sphere(radius), ball, (radius,) * 3),
         (Cylinder(radius, length), tube, (radius, radius, length / 2)),
         (Capsule(radius, length), capsule, ends),
+        (Ellipsoid((radius, length, 0.3)), ellipsoid, (radius, length, 0.3)),
     ]
     for shape, inside, half in cases:
         found = solid_properties(shape)

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import dynx
-from dynx.model.geometry import Appearance, Box, Cylinder, Mesh, Sphere, Visual
+from dynx.model.geometry import Appearance, Box, Cylinder, Ellipsoid, Mesh, Shape, Sphere, Visual
 from dynx.model.geometry.drawn_shapes import coloured_shapes, look_notes
 from dynx.model.geometry.images import MAX_PIXELS, Texture, read_texture
 
@@ -318,8 +318,10 @@ def test_empty_attributes_of_stl_files_are_no_colours(tmp_path: Path) -> None:
     assert not look.is_varied
 
 
-@pytest.mark.parametrize("shape", [Box((1.0, 2.0, 3.0)), Sphere(0.5), Cylinder(0.5, 2.0)])
-def test_images_of_urdf_materials_lie_on_primitives(tmp_path: Path, shape: Box | Sphere | Cylinder) -> None:
+@pytest.mark.parametrize(
+    "shape", [Box((1.0, 2.0, 3.0)), Sphere(0.5), Cylinder(0.5, 2.0), Ellipsoid((1.0, 0.5, 2.0))]
+)
+def test_images_of_urdf_materials_lie_on_primitives(tmp_path: Path, shape: Shape) -> None:
     (tmp_path / "picture.png").write_bytes(png())
     visual = Visual(shape, material=Appearance("a", None, str(tmp_path / "picture.png")))
     ((drawn, rgba, _),) = coloured_shapes(visual, None, GREY)

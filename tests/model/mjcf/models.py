@@ -72,7 +72,10 @@ def geoms(draw: Draw) -> str:
         placed = f' size="{draw(lengths)}" fromto="{ends}"'
     else:
         placed = f' size="{draw(vector(sizes, lengths))}"' + draw(poses())
-    return f'<geom type="{kind}"{placed}{mass}{chosen}{group}/>'
+    # MuJoCo loses digits of the shell of an ellipsoid, which has a test of its own.
+    hollow = [' shellinertia="true"'] if kind != "ellipsoid" else []
+    shell = draw(st.sampled_from(["", "", *hollow]))
+    return f'<geom type="{kind}"{placed}{mass}{chosen}{group}{shell}/>'
 
 
 @st.composite

@@ -12,7 +12,8 @@ from hypothesis import given
 
 import dynx
 from dynx.errors import ArgumentError, DescriptionError, UnsupportedFeatureError
-from dynx.model.geometry import Box, Capsule, Cylinder, Mesh, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere
+from dynx.model.geometry.solids import SHELL_THICKNESS
 from tests.model.mjcf.models import compute, models
 
 mujoco = pytest.importorskip("mujoco")
@@ -154,8 +155,6 @@ def test_primitives_fitted_to_meshes(tmp_path: Path, shape: str, flag: str, kind
     engine = dynx.backend("reference", model)
     require_close(engine.inverse_dynamics(want.q, want.v, want.a), want.torques, 1e-6)
     require_close(engine.mass_matrix(want.q), want.mass_matrix, 1e-6)
-    if shape == "ellipsoid":
-        return
     (placed,) = model.geometry.collisions("link")
     np.testing.assert_allclose(placed.origin.xyz, compiled.geom_pos[0], atol=1e-6)
     R = np.zeros(9)
@@ -163,17 +162,30 @@ def test_primitives_fitted_to_meshes(tmp_path: Path, shape: str, flag: str, kind
     # Axes are those of the file or their opposites.
     np.testing.assert_allclose(np.abs(placed.origin.matrix[:3, :3].T @ R.reshape(3, 3)), np.eye(3), atol=1e-5)
     x, y, z = compiled.geom_size[0]
-    makers: dict[str, Callable[[], Box | Capsule | Cylinder | Sphere]] = {
+    makers: dict[str, Callable[[], Box | Capsule | Cylinder | Ellipsoid | Sphere]] = {
         "sphere": lambda: Sphere(x),
         "capsule": lambda: Capsule(x, 2 * y),
         "cylinder": lambda: Cylinder(x, 2 * y),
         "box": lambda: Box((2 * x, 2 * y, 2 * z)),
+        "ellipsoid": lambda: Ellipsoid((x, y, z)),
     }
     expected = makers[shape]()
     assert type(placed.shape) is type(expected)
     for each in fields(expected):
         got, wanted = getattr(placed.shape, each.name), getattr(expected, each.name)
         np.testing.assert_allclose(got, wanted, rtol=1e-6)
+
+
+@pytest.mark.parametrize("stated", ["", ' mass="3"', ' density="70"'])
+def test_the_shell_of_an_ellipsoid_is_that_of_mujoco(stated: str) -> None:
+    geom = f'<geom type="ellipsoid" size="0.1 0.3 0.2" shellinertia="true"{stated}/>'
+    text = ARM.replace('<geom size="0.1"/>', geom)
+    compiled, inertial = mujoco.MjModel.from_xml_string(text), dynx.load(text).inertial("link")
+    assert inertial.mass == pytest.approx(compiled.body_mass[1], rel=EXACT)
+    # MuJoCo subtracts two volumes that agree but for this share, and loses as many digits.
+    lost = np.finfo(float).eps * 0.1 / SHELL_THICKNESS
+    moments = sorted((inertial.ixx, inertial.iyy, inertial.izz))
+    np.testing.assert_allclose(moments, sorted(compiled.body_inertia[1]), rtol=10.0 * lost)
 
 
 def test_files_are_included_once_and_from_the_folder_alone(tmp_path: Path) -> None:

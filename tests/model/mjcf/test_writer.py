@@ -20,6 +20,7 @@ from dynx.model.geometry import (
     Capsule,
     Collision,
     Cylinder,
+    Ellipsoid,
     Geometry,
     LinkGeometry,
     Mesh,
@@ -197,7 +198,11 @@ def test_shapes_and_colours_are_read_back() -> None:
         Visual(Sphere(0.5), material=other_red),
         Visual(Cylinder(0.5, 1.0)),
     )
-    collisions = (Collision(Capsule(0.25, 0.5), name="felt"), Collision(Plane()))
+    collisions = (
+        Collision(Capsule(0.25, 0.5), name="felt"),
+        Collision(Plane()),
+        Collision(Ellipsoid((0.1, 0.2, 0.3))),
+    )
     model = Model.build("r", [Link("a")], [], geometry=Geometry({"a": LinkGeometry(visuals, collisions)}))
     back = dynx.load(model.to_mjcf()).geometry
     assert back.collisions("a") == collisions

@@ -10,7 +10,7 @@ from hypothesis import given
 
 import dynx
 from dynx.errors import ArgumentError, DescriptionError, UnsupportedFeatureError
-from dynx.model.geometry import Box, Capsule, Mesh, Plane, Sphere
+from dynx.model.geometry import Box, Capsule, Ellipsoid, Mesh, Plane, Sphere
 from dynx.model.sdf.vocabulary import ATTRIBUTES, CLOSED, NOT_USED, USED
 from dynx.model.xml.reading import Element, read_xml
 from dynx.spatial.scalar import Floats
@@ -405,6 +405,8 @@ def test_shapes_and_colours(tmp_path: Path) -> None:
         "<box><size>1 2 3</size></box>": Box((1.0, 2.0, 3.0)),
         "<sphere><radius>0.1</radius></sphere>": Sphere(0.1),
         "<capsule><radius>0.1</radius><length>2</length></capsule>": Capsule(0.1, 2.0),
+        "<ellipsoid><radii>1 2 3</radii></ellipsoid>": Ellipsoid((1.0, 2.0, 3.0)),
+        "<ellipsoid/>": Ellipsoid((1.0, 1.0, 1.0)),
         "<plane><normal>0 0 1</normal><size>9 9</size></plane>": Plane(),
     }
     for content, want in cases.items():
@@ -428,7 +430,7 @@ def test_shapes_and_colours(tmp_path: Path) -> None:
     assert mesh.shape.triangles[0].max() == 2.0
 
 
-@pytest.mark.parametrize("content", ["<ellipsoid/>", "<cone/>", "<polyline/>", "<heightmap/>", "<image/>"])
+@pytest.mark.parametrize("content", ["<cone/>", "<polyline/>", "<heightmap/>", "<image/>"])
 def test_shapes_that_dynx_has_not_are_named(content: str) -> None:
     model = dynx.load(shape(content))
     tag = content.strip("</>")

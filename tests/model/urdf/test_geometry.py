@@ -18,6 +18,7 @@ from dynx.model.geometry import (
     Capsule,
     Collision,
     Cylinder,
+    Ellipsoid,
     Geometry,
     LinkGeometry,
     Mesh,
@@ -43,8 +44,15 @@ def test_every_shape_is_read() -> None:
         visual('<sphere radius="2"/>'),
         visual('<cylinder radius="1" length="2"/>'),
         visual('<capsule radius="1" length="2"/>'),
+        visual('<ellipsoid radii="1 2 3"/>'),
     ).geometry.visuals("a")
-    assert [each.shape for each in found] == [Box((1, 2, 3)), Sphere(2), Cylinder(1, 2), Capsule(1, 2)]
+    assert [each.shape for each in found] == [
+        Box((1, 2, 3)),
+        Sphere(2),
+        Cylinder(1, 2),
+        Capsule(1, 2),
+        Ellipsoid((1, 2, 3)),
+    ]
     assert found[0].origin.xyz == (1.0, 0.0, 0.0)
     assert found[0].line == 1
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.model import Pose
 from dynx.model.elements import IDENTITY
-from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Shape, Sphere
+from dynx.model.geometry import Box, Capsule, Collision, Cylinder, Ellipsoid, HeightField, Mesh, Shape, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.world import BodyState, Camera, Picture, Scene, SceneBody, WorldState, ground
 from dynx.world.camera import draw_picture
@@ -75,7 +75,7 @@ def test_the_middle_of_the_picture_is_the_target_and_up_is_up() -> None:
 ANGLES = st.floats(-math.pi, math.pi)
 
 
-@given(st.tuples(ANGLES, ANGLES, ANGLES), st.tuples(*[st.floats(-0.3, 0.3)] * 3), st.sampled_from(range(4)))
+@given(st.tuples(ANGLES, ANGLES, ANGLES), st.tuples(*[st.floats(-0.3, 0.3)] * 3), st.sampled_from(range(5)))
 @settings(max_examples=20, deadline=None)
 def test_a_mesh_looks_like_its_primitive(
     tmp_path_factory: pytest.TempPathFactory,
@@ -89,10 +89,13 @@ def test_a_mesh_looks_like_its_primitive(
         (Sphere(0.3), make.icosphere(subdivisions=4, radius=0.3), 3e-2),
         (Cylinder(0.2, 0.5), make.cylinder(0.2, 0.5, sections=256), 3e-2),
         (Capsule(0.2, 0.3), make.capsule(0.3, 0.2, count=[64, 64]), 3e-2),
+        (Ellipsoid((0.3, 0.2, 0.4)), make.icosphere(subdivisions=4), 3e-2),
     ]
     shape, surface, error = cases[which]
     if which == 3:
         surface.apply_translation(-surface.bounds.mean(axis=0))
+    if which == 4:
+        surface.apply_transform(np.diag([0.3, 0.2, 0.4, 1.0]))
     path = tmp_path_factory.mktemp("mesh") / "a.obj"
     path.write_text(str(surface.export(file_type="obj", digits=12)))
     camera = Camera(size=(64, 48))

@@ -48,7 +48,7 @@ def scenes(draw: Draw) -> str:
     </default>
   </default>
   <worldbody>{"".join(parts[k] for k in order)}</worldbody>
-</mujoco>""".replace('type="ellipsoid"', 'type="ellipsoid" contype="0" conaffinity="0"')
+</mujoco>"""
 
 
 def differences(mujoco: Any, compiled: Any, scene: Scene, seed: int = 0) -> dict[str, float]:

@@ -21,7 +21,7 @@ from dynx.errors import (
     RobotNotFoundError,
     UnknownNameError,
 )
-from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Sphere
+from dynx.model.geometry import Box, Capsule, Collision, Cylinder, Ellipsoid, HeightField, Sphere
 from dynx.world import (
     Material,
     PDMotor,
@@ -50,6 +50,7 @@ solids = st.one_of(
     st.builds(Sphere, sizes),
     st.builds(Cylinder, sizes, sizes),
     st.builds(Capsule, sizes, sizes),
+    st.builds(Ellipsoid, st.tuples(sizes, sizes, sizes)),
 )
 shapes = st.lists(st.builds(Collision, solids, poses), min_size=1, max_size=3).map(tuple)
 names = st.text("abcdefgh_", min_size=1, max_size=6)

@@ -410,7 +410,7 @@ def test_another_keyframe_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "named"),
     [
-        ('<freejoint/><geom size="0.1"/>', '<freejoint/><geom type="ellipsoid" size="1 2 3"/>', "ellipsoid"),
+        ('<freejoint/><geom size="0.1"/>', '<freejoint/><geom type="sdf" mass="1"/>', "signed distance"),
         ('<joint name="hinge"', '<joint name="hinge" type="ball"', "hinge"),
         ("<freejoint/>", '<freejoint/><joint name="second"/>', "ball"),
         ("</mujoco>", '<equality><weld body1="bal"/></equality></mujoco>', "ball"),
