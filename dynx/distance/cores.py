@@ -168,11 +168,11 @@ class EllipsoidCore(Core):
 
     def __init__(self, radii: Floats) -> None:
         super().__init__(0.0, float(radii.max()))
-        self._radii = radii
+        self.radii = radii
 
     def place(self, R: Floats, p: Vector3) -> Core:
         super().place(R, p)
-        self._scaled = R * self._radii
+        self._scaled = R * self.radii
         self._axes: list[list[float]] = self._scaled.T.tolist()
         return self
 

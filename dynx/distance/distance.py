@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dynx.distance.cores import ConvexShape, Core, core_of
 from dynx.distance.gjk import CorePair
-from dynx.distance.penetration import Penetration, penetration, penetration_of_parallel
+from dynx.distance.penetration import Penetration, penetration, penetration_of_parallel, penetration_of_point
 from dynx.errors import ArgumentError
 from dynx.model import Pose
 from dynx.model.elements import checked_pose, rigid_matrix
@@ -166,6 +166,9 @@ def distance_of_cores(
 
 def _penetration(a: Core, b: Core) -> Penetration:
     """Return the depth in closed form where that is exact, otherwise with the better bounds."""
+    point = penetration_of_point(a, b)
+    if point is not None:
+        return point
     parallel = penetration_of_parallel(a, b)
     if parallel is not None and parallel.upper - parallel.lower <= CLOSED_FORM_GAP * (a.extent + b.extent):
         return parallel

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.distance.cores import Core, CylinderCore, PointCore, SegmentCore
+from dynx.distance.cores import Core, CylinderCore, EllipsoidCore, PointCore, SegmentCore
 from dynx.distance.gjk import CorePair, nearest_to_origin
 from dynx.spatial.plain import dot, minus
 from dynx.spatial.scalar import Floats
@@ -292,6 +292,47 @@ def penetration_of_parallel(a: Core, b: Core) -> Penetration | None:
     x, y, z = normal.tolist()
     upper = dot(minus(a.support((x, y, z)), b.support((-x, -y, -z))), (x, y, z))
     return Penetration(max(0.0, min(upper, depth - slack)), upper, normal, on_a, on_b)
+
+
+def penetration_of_point(a: Core, b: Core) -> Penetration | None:
+    """Return the depth of a point in an ellipsoid, which no polytope has where it is alike all around; None
+    for other cores."""
+    if isinstance(b, EllipsoidCore) and isinstance(a, PointCore):
+        found = penetration_of_point(b, a)
+        return found and Penetration(found.lower, found.upper, -found.normal, found.point_b, found.point_a)
+    if not isinstance(a, EllipsoidCore) or not isinstance(b, PointCore):
+        return None
+    p_a, p_b = np.array(a.p), np.array(b.p)
+    local = _nearest_on_ellipsoid(a.radii, a.R.T @ (p_b - p_a))
+    normal = a.R @ (local / a.radii**2)
+    normal /= np.linalg.norm(normal)
+    point = p_a + a.R @ local
+    x, y, z = normal.tolist()
+    upper = dot(minus(a.support((x, y, z)), b.p), (x, y, z))
+    return Penetration(max(0.0, min(upper, float(np.linalg.norm(point - p_b)))), upper, normal, point, p_b)
+
+
+def _nearest_on_ellipsoid(radii: Floats, p: Floats) -> Floats:
+    """Return the point (3,) of the surface of an ellipsoid that is nearest to a point p (3,) inside.
+
+    With lengths divided by the shortest half axis, it is z^2 q / (u + z^2 - 1), where u in [0, 1] puts it on
+    the surface (D. Eberly, "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid", 2013).
+    """
+    least = radii.min()
+    z, q = radii / least, p / least
+    beyond = z * z - 1.0
+    short = z == 1.0
+    low, high = 0.0, 1.0
+    while low < (u := 0.5 * (low + high)) < high:
+        with np.errstate(over="ignore"):
+            above = np.sum((z * q / (u + beyond)) ** 2) > 1.0
+        low, high = (u, high) if above else (low, u)
+    x = np.where(short, 0.0, z * z * q / np.where(short, 1.0, high + beyond))
+    # Along the shortest axes is what remains, also where p is on the plane across them.
+    length = float(np.linalg.norm(q[short]))
+    along = q[short] / length if length > 0.0 else np.eye(int(short.sum()))[0]
+    x[short] = np.sqrt(max(0.0, 1.0 - float(np.sum((x / z) ** 2)))) * along
+    return np.asarray(least * x)
 
 
 def _sizes(core: PointCore | SegmentCore | CylinderCore) -> tuple[float, float]:

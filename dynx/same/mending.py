@@ -12,7 +12,7 @@ import numpy as np
 
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, Pose
-from dynx.model.mjcf.document import read_document
+from dynx.model.mjcf.expansion import read_document
 from dynx.model.xml.reading import Element
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.model.xml.text import quoteattr

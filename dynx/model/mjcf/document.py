@@ -1,4 +1,4 @@
-"""MJCF text as one document: files included, defaults applied, copies made, settings of the compiler.
+"""A document in MJCF: its sections, files included, classes of defaults, settings of the compiler.
 
 The format is that of MuJoCo 4.0 (https://mujoco.readthedocs.io, XML reference).
 """
@@ -7,39 +7,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
 from dynx.errors import nearest, shown
-from dynx.model.elements import Note
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh, reason_unknown
-from dynx.model.mjcf.options import MjcfOptions, read_options
-from dynx.model.package_search import StrPath
+from dynx.model.mjcf.options import MjcfOptions
 from dynx.model.topology import MAX_LINKS
-from dynx.model.xml.reading import Element, read_xml
+from dynx.model.xml.reading import Element
 from dynx.model.xml.several_files import FilesReading
 from dynx.model.xml.values import Reading
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import quat_from_rotation, rotation_about, rotation_from_quat, rotation_of_z
+from dynx.spatial.so3 import rotation_about, rotation_from_quat, rotation_of_z
 
 _ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
-_WITH_DEFAULTS = frozenset(["geom", "joint", "site", "mesh", "material"])
+WITH_DEFAULTS = frozenset(["geom", "joint", "site", "mesh", "material"])
 """Elements that are read and take attributes that they lack from a class of defaults."""
 
 _POSE = frozenset(["pos", *_ORIENTATIONS])
 _NAMED = frozenset(["name", "class", "group", "user"])
 _SOFTNESS = frozenset(["margin", "solimp", "solref"])
-_ATTRIBUTES: dict[str, frozenset[str]] = {
+ATTRIBUTES: dict[str, frozenset[str]] = {
     "body": _POSE | {"name", "childclass", "mocap", "gravcomp", "user", "sleep"},
     "frame": _POSE | {"name", "childclass"},
     "inertial": _POSE | {"mass", "diaginertia", "fullinertia"},
     "freejoint": frozenset(["name", "group", "align"]),
     "replicate": frozenset(["count", "offset", "euler", "sep", "childclass", "prefix"]),
     "include": frozenset(["file"]),
+    "attach": frozenset(["model", "body", "frame", "prefix"]),
     "joint": _NAMED
     | {"actuatorfrclimited", "actuatorfrcrange", "actuatorgravcomp", "armature", "axis", "damping", "margin"}
     | {"frictionloss", "limited", "pos", "range", "ref", "solimpfriction", "solimplimit", "solreffriction"}
@@ -84,15 +83,27 @@ _ATTRIBUTES: dict[str, frozenset[str]] = {
 }
 """Attributes of the elements that are read. MuJoCo refuses others, and so does dynx: they are misspelt."""
 
-_WITH_CONTENT_OF_THEIR_OWN = frozenset(["composite", "flexcomp"])
+WITH_CONTENT_OF_THEIR_OWN = frozenset(["composite", "flexcomp"])
 """Elements whose content has attributes of its own, under tags that stand elsewhere too."""
 
 _SHORTEST = 1e-14
 """Length of a direction below which MuJoCo refuses it."""
 
 
+@dataclass
 class MjcfReading(FilesReading):
-    """State of reading a model in MJCF, whose elements may come from several files."""
+    """State of reading a model in MJCF, whose elements may come from several files and attached models."""
+
+    origins: dict[int, tuple[Element, Origin]] = field(default_factory=dict)
+    """Element of an attached model, and its origin, by the identity of the element."""
+
+    def like(self, element: Element, attributes: dict[str, str]) -> Element:
+        """Return an element at the place of another one, with other attributes and the same content."""
+        new = super().like(element, attributes)
+        held = self.origins.get(id(element))
+        if held is not None:
+            self.origins[id(new)] = (new, held[1])
+        return new
 
     def some_numbers(
         self, element: Element, attribute: str, what: str, least: int, most: int
@@ -133,6 +144,18 @@ class Compiler:
         """Return an angle of the file in radians."""
         return math.radians(angle) if self.degrees else angle
 
+    def euler(self, angles: Iterable[float]) -> Floats:
+        """Return the rotation (3, 3) by these angles of the file about the axes of `eulerseq` in turn.
+
+        Small letters are axes that turn along.
+        """
+        R = np.eye(3)
+        for letter, angle in zip(self.euler_sequence, angles, strict=True):
+            axis = np.eye(3)["xyz".index(letter.lower())]
+            one = turn(axis, self.radians(angle))
+            R = R @ one if letter.islower() else one @ R
+        return R
+
     def path(self, folder: str, filename: str) -> str:
         """Return the path of an asset from the folder of the model."""
         name = PurePath(filename).name if self.strip_path else filename
@@ -140,8 +163,16 @@ class Compiler:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """The settings and the file of the model that an element is of."""
+
+    compiler: Compiler
+    source: str
+
+
+@dataclass(frozen=True)
 class MjcfText:
-    """A model in MJCF: its sections, with the files included."""
+    """A model in MJCF: its sections, with the files included and other models attached."""
 
     root: Element
     compiler: Compiler
@@ -150,6 +181,15 @@ class MjcfText:
     reading: MjcfReading
     options: MjcfOptions
     package_dirs: tuple[str, ...] = ()
+
+    def origin(self, element: Element) -> Origin:
+        """Return the settings and the file of the model of an element: this one, or an attached one."""
+        held = self.reading.origins.get(id(element))
+        return Origin(self.compiler, self.reading.source) if held is None else held[1]
+
+    def compiler_of(self, element: Element) -> Compiler:
+        """Return the settings that give the numbers and names of an element their meaning."""
+        return self.origin(element).compiler
 
     def sections(self, tag: str) -> Iterator[Element]:
         """Yield the content of all sections of that tag."""
@@ -198,9 +238,9 @@ class MjcfText:
         if kind == "axisangle":
             *axis, angle = reading.numbers(element, kind, what, 4)
             unit = _direction(axis, kind, element, what, reading)
-            return turn(unit, self.compiler.radians(angle))
+            return turn(unit, self.compiler_of(element).radians(angle))
         if kind == "euler":
-            return self.euler(reading.vector(element, kind, what))
+            return self.compiler_of(element).euler(reading.vector(element, kind, what))
         if kind == "zaxis":
             return rotation_of_z(
                 _direction(reading.vector(element, kind, what), kind, element, what, reading)
@@ -210,21 +250,11 @@ class MjcfText:
         y_axis = _direction(numbers[3:] - x_axis * (x_axis @ numbers[3:]), kind, element, what, reading)
         return np.stack([x_axis, y_axis, np.cross(x_axis, y_axis)], axis=1)
 
-    def euler(self, angles: Iterable[float]) -> Floats:
-        """Return the rotation (3, 3) by these angles of the file about the axes of `eulerseq` in turn.
-
-        Small letters are axes that turn along.
-        """
-        R = np.eye(3)
-        for letter, angle in zip(self.compiler.euler_sequence, angles, strict=True):
-            axis = np.eye(3)["xyz".index(letter.lower())]
-            one = turn(axis, self.compiler.radians(angle))
-            R = R @ one if letter.islower() else one @ R
-        return R
-
-    def find(self, folder: str, filename: str) -> tuple[str, str]:
-        """Return the path of an asset as `find_mesh` finds it; else the name in the file, and the reason."""
-        name, source = self.compiler.path(folder, filename), self.reading.source
+    def find(self, element: Element, folder: str, filename: str) -> tuple[str, str]:
+        """Return the path of an asset of an element as `find_mesh` finds it; else the name in the file, and
+        the reason."""
+        origin = self.origin(element)
+        name, source = origin.compiler.path(folder, filename), origin.source
         try:
             found = find_mesh(name, source, self.package_dirs)
         except MeshNotFoundError as error:
@@ -246,41 +276,7 @@ def _direction(numbers: Iterable[float], kind: str, element: Element, what: str,
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def read_document(data: str | bytes, source: str, package_dirs: Iterable[StrPath] = ()) -> MjcfText | None:
-    """Read a model in MJCF, with the files that it includes; None for a document of another kind.
-
-    Files are included from the folder of the model's files alone, as meshes are (`find_mesh`). Raises
-    DescriptionError for malformed content.
-    """
-    notes: list[Note] = []
-    reading = MjcfReading(source, notes)
-    folders = tuple(map(str, package_dirs))
-    root = read_xml(data, source, notes)
-    if root.tag != "mujoco":
-        return None
-    _Includes(reading, folders).expand(root)
-    _require_bounded(root, reading)
-    for tag in ("compiler", "default", "worldbody"):
-        for section in root.all(tag):
-            waiting = [section]
-            while waiting:
-                each = waiting.pop()
-                reading.require_known_attributes(each, _ATTRIBUTES.get(each.tag, each.attributes))
-                # Those of elements that are refused as a whole are not judged.
-                waiting += [] if each.tag in _WITH_CONTENT_OF_THEIR_OWN else each.children
-    compiler = _read_compiler(root, reading)
-    defaults, main_class = _read_defaults(root, reading)
-    for tree in root.all("worldbody"):
-        _require_classes(tree, defaults, reading)
-    options = read_options(root, reading)
-    document = MjcfText(root, compiler, defaults, main_class, reading, options, folders)
-    copies = _Replicates(document)
-    for tree in root.all("worldbody"):
-        copies.expand(tree)
-    return document
-
-
-def _require_classes(
+def require_classes(
     tree: Element, defaults: dict[str, dict[str, dict[str, str]]], reading: MjcfReading
 ) -> None:
     """Raise DescriptionError where a body names a class that no ``<default>`` has."""
@@ -295,7 +291,7 @@ def _require_classes(
         waiting += reversed(element.children)
 
 
-def _require_bounded(root: Element, reading: MjcfReading) -> None:
+def require_bounded(root: Element, reading: MjcfReading) -> None:
     count, waiting = 0, [root]
     while waiting:
         count += 1
@@ -305,11 +301,12 @@ def _require_bounded(root: Element, reading: MjcfReading) -> None:
         waiting += each.children
 
 
-class _Includes:
+class Includes:
     """Replaces each ``<include>`` by the content of its file."""
 
-    def __init__(self, reading: MjcfReading, package_dirs: tuple[str, ...]) -> None:
-        self._reading, self._package_dirs = reading, package_dirs
+    def __init__(self, reading: MjcfReading, package_dirs: tuple[str, ...], source: str) -> None:
+        """`source` is the file of the model."""
+        self._reading, self._package_dirs, self._source = reading, package_dirs, source
         self._read: set[str] = set()
 
     def expand(self, element: Element, depth: int = 0) -> None:
@@ -333,8 +330,8 @@ class _Includes:
         filename = reading.attribute(include, "file", "<include>")
         reading.count_included(include, depth)
         try:
-            path = find_mesh(filename, reading.source, self._package_dirs)
-            reason = None if path else reason_unknown(filename, reading.source)
+            path = find_mesh(filename, self._source, self._package_dirs)
+            reason = None if path else reason_unknown(filename, self._source)
         except MeshNotFoundError as error:
             path, reason = None, str(error)
         if path is None:
@@ -353,7 +350,7 @@ _WORDS = {
 }
 
 
-def _read_compiler(root: Element, reading: MjcfReading) -> Compiler:
+def read_compiler(root: Element, reading: MjcfReading) -> Compiler:
     values: dict[str, Any] = {}
     what = "<compiler>"
     for element in root.all("compiler"):
@@ -391,7 +388,7 @@ def _read_compiler(root: Element, reading: MjcfReading) -> Compiler:
     return Compiler(**values)
 
 
-def _read_defaults(root: Element, reading: MjcfReading) -> tuple[dict[str, dict[str, dict[str, str]]], str]:
+def read_defaults(root: Element, reading: MjcfReading) -> tuple[dict[str, dict[str, dict[str, str]]], str]:
     """Return the attributes of each class and tag, with those of the classes around, and the main class."""
     classes: dict[str, dict[str, dict[str, str]]] = {}
     tops = root.all("default")
@@ -407,7 +404,7 @@ def _read_defaults(root: Element, reading: MjcfReading) -> tuple[dict[str, dict[
         inherited = classes.get(name) or classes.get(parent or "", {})
         own = {tag: dict(attributes) for tag, attributes in inherited.items()}
         for child in element.children:
-            if child.tag in _WITH_DEFAULTS:
+            if child.tag in WITH_DEFAULTS:
                 given = dict(own.get(child.tag, {}))
                 if any(each in child.attributes for each in _ORIENTATIONS):
                     given = {key: value for key, value in given.items() if key not in _ORIENTATIONS}
@@ -418,64 +415,6 @@ def _read_defaults(root: Element, reading: MjcfReading) -> tuple[dict[str, dict[
     return classes, main_class
 
 
-class _Replicates:
-    """Replaces each ``<replicate>`` by its copies, each in a ``<frame>``."""
-
-    def __init__(self, document: MjcfText) -> None:
-        self._document, self._reading = document, document.reading
-        self._count = 0
-
-    def expand(self, element: Element) -> None:
-        for child in element.children:
-            self.expand(child)
-        if any(child.tag == "replicate" for child in element.children):
-            element.children = [
-                each
-                for child in element.children
-                for each in (self._copies(child) if child.tag == "replicate" else [child])
-            ]
-
-    def _copies(self, element: Element) -> list[Element]:
-        reading, what = self._reading, "<replicate>"
-        count = reading.number(element, "count", what)
-        if count != int(count) or not 1 <= count <= MAX_LINKS:
-            raise reading.error(
-                element, f"count of {what} is {count:g}; wanted a whole number from 1 to {MAX_LINKS}"
-            )
-        angles, offset = (
-            np.array(reading.vector(element, each, what) if each in element.attributes else (0.0, 0.0, 0.0))
-            for each in ("euler", "offset")
-        )
-        if "prefix" in element.attributes:
-            reading.note(element, f"prefix of {what} is not read: MuJoCo gives it no effect")
-        separator = element.attributes.get("sep", "")
-        digits = len(str(int(count)))
-        position = np.zeros(3)
-        found = []
-        for number in range(int(count)):
-            # As MuJoCo does: the angles of copy k are k times those stated, whatever that turns about.
-            R = self._document.euler(number * angles)
-            x, y, z, w = quat_from_rotation(R)
-            attributes = {
-                "pos": " ".join(map(repr, position.tolist())),
-                "quat": " ".join(map(repr, (float(w), float(x), float(y), float(z)))),
-            }
-            if "childclass" in element.attributes:
-                attributes["childclass"] = element.attributes["childclass"]
-            frame = Element("frame", attributes, element.line)
-            suffix = f"{separator}{number:0{digits}d}"
-            frame.children = [self._renamed(child, suffix) for child in element.children]
-            found.append(frame)
-            position = position + R @ offset
-        return found
-
-    def _renamed(self, element: Element, suffix: str) -> Element:
-        self._count += 1
-        if self._count > MAX_ELEMENTS:
-            raise self._reading.error(element, f"<replicate> makes more than {MAX_ELEMENTS} elements")
-        attributes = dict(element.attributes)
-        if "name" in attributes:
-            attributes["name"] += suffix
-        new = self._reading.like(element, attributes)
-        new.children = [self._renamed(child, suffix) for child in element.children]
-        return new
+def stem(path: str) -> str:
+    """Return the name of a file without its folder and suffix, as MuJoCo names assets without a name."""
+    return path.rpartition("/")[2].rpartition(".")[0]

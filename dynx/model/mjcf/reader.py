@@ -36,7 +36,8 @@ from dynx.model.elements import (
 from dynx.model.geometry import Geometry, LinkGeometry
 from dynx.model.geometry.solids import inertial_of
 from dynx.model.mjcf.attributes import UNLIMITED
-from dynx.model.mjcf.document import MjcfText, read_document, turn
+from dynx.model.mjcf.document import MjcfText, turn
+from dynx.model.mjcf.expansion import read_document
 from dynx.model.mjcf.extension import MIMIC, Extension
 from dynx.model.mjcf.shapes import Geom, GeomReader
 from dynx.model.package_search import StrPath
@@ -57,7 +58,6 @@ _NO_ROTATION = np.eye(3)
 _REFUSED = {
     "composite": "which makes bodies",
     "flexcomp": "which makes a soft body",
-    "attach": "which attaches a part of another model",
 }
 _NOT_READ = {
     "light": None,
@@ -424,7 +424,7 @@ class _TreeReader:
 
     def _note_alignment(self, body: _BodyContent) -> None:
         joint = body.joints[0][0]
-        by_file = "true" if self._document.compiler.align_free else "false"
+        by_file = "true" if self._document.compiler_of(joint).align_free else "false"
         align = self._reading.choice(joint, "align", "a free joint", ("auto", "true", "false"), "auto")
         if (by_file if align == "auto" else align) == "true":
             self._reading.note(
@@ -605,14 +605,14 @@ class _TreeReader:
 
     def _position(self, element: Element, attribute: str, kind: str, what: str) -> float:
         value = self._reading.number_or(element, attribute, what, 0.0)
-        return self._document.compiler.radians(value) if kind == "hinge" else value
+        return self._document.compiler_of(element).radians(value) if kind == "hinge" else value
 
     def _limited(self, element: Element, limited: str, limits: str, what: str) -> bool:
         choice = self._reading.choice(element, limited, what, ("auto", "true", "false"), "auto")
         given = limits in element.attributes
         if choice == "true" and not given:
             raise self._reading.error(element, f'{what} has {limited}="true" and no {limits}')
-        if choice == "auto" and given and not self._document.compiler.autolimits:
+        if choice == "auto" and given and not self._document.compiler_of(element).autolimits:
             raise self._reading.error(
                 element, f'{what} has {limits} and not {limited}, which autolimits="false" demands'
             )
@@ -623,7 +623,7 @@ class _TreeReader:
         limited = self._limited(element, "limited", "range", what)
         if limited:
             ends = reading.numbers(element, "range", what, 2)
-            lower, upper = map(self._document.compiler.radians, ends) if kind == "hinge" else ends
+            lower, upper = map(self._document.compiler_of(element).radians, ends) if kind == "hinge" else ends
             if lower >= upper:
                 raise reading.error(
                     element,
@@ -716,7 +716,7 @@ class _TreeReader:
     # -- inertias -------------------------------------------------------------------------------
 
     def _inertial(self, body: _BodyContent) -> Inertial | None:
-        compiler = self._document.compiler
+        compiler = self._document.compiler_of(body.element)
         if len(body.inertials) > 1:
             raise self._reading.error(body.inertials[1], f"body {shown(body.name)} has two <inertial>")
         inertial = None
@@ -748,7 +748,7 @@ class _TreeReader:
 
     def _from_geoms(self, body: _BodyContent) -> Inertial | None:
         """Add the masses of the geoms of a body."""
-        low, high = self._document.compiler.inertia_groups
+        low, high = self._document.compiler_of(body.element).inertia_groups
         found = [
             each
             for geom in body.geoms
@@ -760,7 +760,7 @@ class _TreeReader:
 
     def _bounded(self, inertial: Inertial | None, body: _BodyContent) -> Inertial | None:
         """Apply ``balanceinertia``, ``boundmass`` and ``boundinertia``."""
-        compiler = self._document.compiler
+        compiler = self._document.compiler_of(body.element)
         if inertial is None and not (compiler.bound_mass or compiler.bound_inertia):
             return None
         found = inertial or Inertial(line=body.element.line)

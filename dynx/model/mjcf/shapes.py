@@ -28,7 +28,7 @@ from dynx.model.geometry import (
 from dynx.model.geometry.mesh_inertia import mesh_properties
 from dynx.model.geometry.shapes import MAX_HEIGHTS
 from dynx.model.geometry.solids import Shape, SolidProperties, shell_properties, solid_properties
-from dynx.model.mjcf.document import MjcfText
+from dynx.model.mjcf.document import MjcfText, stem
 from dynx.model.xml.reading import Element
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
@@ -127,15 +127,15 @@ class GeomReader:
                 self._materials[element.attributes.get("name", "")] = document.resolved(element, None)
             elif element.tag == "texture":
                 given = element.attributes
-                self._textures[given.get("name") or _stem(given.get("file", ""))] = element
+                self._textures[given.get("name") or stem(given.get("file", ""))] = element
             elif element.tag == "hfield":
-                field = element.attributes.get("name") or _stem(element.attributes.get("file", ""))
+                field = element.attributes.get("name") or stem(element.attributes.get("file", ""))
                 self._fields[field] = element
             elif element.tag == "mesh":
                 resolved = document.resolved(element, None)
                 name = element.attributes.get("name")
                 if name is None:
-                    name = _stem(element.attributes.get("file", ""))
+                    name = stem(element.attributes.get("file", ""))
                 self._meshes[name] = resolved
 
     def geom(self, element: Element, childclass: str | None, outer: Floats) -> Geom:
@@ -290,7 +290,7 @@ class GeomReader:
         moments, axes = np.linalg.eigh(solid.inertia)
         axes = axes[:, ::-1] * np.sign(np.linalg.det(axes[:, ::-1]))
         frame = homogeneous(axes, solid.center)
-        if self._document.compiler.fit_bounding_box:
+        if self._document.compiler_of(element).fit_bounding_box:
             inner = (asset.mesh.triangles[0] - solid.center) @ axes
             low, high = inner.min(axis=0), inner.max(axis=0)
             x, y, z = (high - low) / 2.0
@@ -386,7 +386,7 @@ class GeomReader:
         filename = element.attributes["file"]
         if filename.lower().endswith(".png"):
             raise self._reading.unsupported(element, f"{what} is an image, which dynx does not read")
-        path, reason = self._document.find(self._document.compiler.mesh_folder, filename)
+        path, reason = self._document.find(element, self._document.compiler_of(element).mesh_folder, filename)
         if reason:
             raise self._reading.error(element, f"{what} is not read: {reason}")
         data = read_file(path)
@@ -429,7 +429,9 @@ class GeomReader:
         element = None if name is None else self._textures.get(name)
         if element is None or "file" not in element.attributes:
             return None, ""
-        return self._document.find(self._document.compiler.texture_folder, element.attributes["file"])
+        return self._document.find(
+            element, self._document.compiler_of(element).texture_folder, element.attributes["file"]
+        )
 
     def _asset(self, element: Element, what: str) -> MeshAsset:
         name = element.attributes["mesh"]
@@ -467,11 +469,8 @@ class GeomReader:
             why = "made by the compiler" if "builtin" in given else "given by its vertices"
             fault = reading.unsupported(element, f"{what} is {why}; dynx reads meshes from files")
         else:
-            path, reason = self._document.find(self._document.compiler.mesh_folder, given["file"])
+            path, reason = self._document.find(
+                element, self._document.compiler_of(element).mesh_folder, given["file"]
+            )
             fault = reading.error(element, f"{what} is not read: {reason}") if reason else fault
         return MeshAsset(Mesh(path, scale, fault), placement, inertia, element, given.get("material"))
-
-
-def _stem(path: str) -> str:
-    """Return the name of a file without its folder and suffix, as MuJoCo names assets without a name."""
-    return path.rpartition("/")[2].rpartition(".")[0]

@@ -228,7 +228,6 @@ WITHOUT = '<geom size="0.1"/>'
 FAULTS = {
     "ball": ('axis="0 1 0"', 'type="ball"', UnsupportedFeatureError, "5: joint 'hinge' is a ball joint"),
     "flex": (WITHOUT, "<flexcomp/>", UnsupportedFeatureError, "6: dynx does not read <flexcomp>"),
-    "attach": (WITHOUT, "<attach/>", UnsupportedFeatureError, "6: dynx does not read <attach>"),
     "two": (
         "</worldbody>",
         '<body name="other"><freejoint/></body></worldbody>',
