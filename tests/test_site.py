@@ -70,7 +70,7 @@ EXAMPLES = {
     "dynx.viewer": "Viewer view",
     "dynx.world": (
         "Camera ContactSensor Encoder ForceTorqueSensor Imu JointTorqueSensor Material Picture "
-        "RaySensor SceneRobot Weld box capsule cylinder ground read_scene scene_to_mjcf sphere "
+        "RaySensor SceneRobot Weld box capsule cylinder ellipsoid ground read_scene scene_to_mjcf sphere "
         "write_scene"
     ),
 }

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.distance.cores import ConvexShape, Core, core_of
 from dynx.distance.gjk import CorePair
-from dynx.distance.penetration import Penetration, penetration, penetration_of_parallel, penetration_of_point
 from dynx.errors import ArgumentError
 from dynx.model import Pose
 from dynx.model.elements import checked_pose, rigid_matrix
@@ -18,6 +18,9 @@ from dynx.model.geometry import Plane
 from dynx.model.numbers import MAX_MAGNITUDE, checked_vector
 from dynx.spatial.plain import Vector3
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.distance.penetration import Penetration
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +169,10 @@ def distance_of_cores(
 
 def _penetration(a: Core, b: Core) -> Penetration:
     """Return the depth in closed form where that is exact, otherwise with the better bounds."""
+    # Imported here, because searches avoid shapes that overlap.
+    from dynx.distance.closed_form_depths import penetration_of_parallel, penetration_of_point
+    from dynx.distance.penetration import penetration
+
     point = penetration_of_point(a, b)
     if point is not None:
         return point

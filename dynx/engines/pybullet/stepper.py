@@ -33,6 +33,7 @@ from dynx.engines.pybullet.robot import BulletBody, BulletRobot
 from dynx.engines.silence import silence
 from dynx.files.temporary import temporary_folder
 from dynx.model.geometry import Ellipsoid
+from dynx.model.geometry.triangulation import BALL_DEVIATION
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
@@ -149,7 +150,7 @@ class BulletStepper(Stepper):
         Feature.DRY_FRICTION: "solved by iterations, before mimic joints are coupled",
     }
     replaced_shapes: ClassVar[Mapping[type, str]] = {
-        Ellipsoid: f"polyhedra, within {Ellipsoid.MESH_DEVIATION * 100:g} % of the half axes"
+        Ellipsoid: f"polyhedra, within {BALL_DEVIATION * 100:g} % of the half axes"
     }
     native_queries: ClassVar[str] = "dynx.engines.pybullet.native_queries:BulletQueries"
 

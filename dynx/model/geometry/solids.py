@@ -36,9 +36,8 @@ class SolidProperties:
     def __add__(self, other: SolidProperties) -> SolidProperties:
         volume = self.volume + other.volume
         center = (self.volume * self.center + other.volume * other.center) / volume
-        inertia = sum(
-            part.inertia + part.volume * _point_inertia(part.center - center) for part in (self, other)
-        )
+        offsets = [(part, part.center - center) for part in (self, other)]
+        inertia = sum(p.inertia + p.volume * (r @ r * np.eye(3) - np.outer(r, r)) for p, r in offsets)
         return SolidProperties(volume, center, np.asarray(inertia))
 
 
@@ -50,83 +49,26 @@ def solid_properties(shape: Shape) -> SolidProperties:
     center = np.zeros(3)
     if isinstance(shape, Box):
         x, y, z = shape.size
-        return SolidProperties(x * y * z, center, x * y * z * _diagonal(x**2 / 12, y**2 / 12, z**2 / 12))
+        return SolidProperties(
+            x * y * z, center, diagonal_inertia(x**2 / 12, y**2 / 12, z**2 / 12, x * y * z)
+        )
     if isinstance(shape, Sphere):
         volume = 4.0 / 3.0 * math.pi * shape.radius**3
         square = shape.radius**2 / 5
-        return SolidProperties(volume, center, volume * _diagonal(square, square, square))
+        return SolidProperties(volume, center, volume * diagonal_inertia(square, square, square))
     if isinstance(shape, Cylinder):
         volume = math.pi * shape.radius**2 * shape.length
         square = shape.radius**2 / 4
-        return SolidProperties(volume, center, volume * _diagonal(square, square, shape.length**2 / 12))
+        return SolidProperties(volume, center, diagonal_inertia(square, square, shape.length**2 / 12, volume))
     if isinstance(shape, Capsule):
         return _capsule(shape.radius, shape.length)
     if isinstance(shape, Ellipsoid):
         x, y, z = shape.radii
         volume = 4.0 / 3.0 * math.pi * x * y * z
-        return SolidProperties(volume, center, volume / 5.0 * _diagonal(x * x, y * y, z * z))
+        return SolidProperties(volume, center, volume / 5.0 * diagonal_inertia(x * x, y * y, z * z))
     if isinstance(shape, Mesh):
         return polyhedron_properties(*shape.hull)
     raise ArgumentError(f"a {type(shape).__name__} has no volume, so it cannot have a mass")
-
-
-SHELL_THICKNESS = 1e-6
-"""Growth of the half axes of an ellipsoid [m] that MuJoCo takes for the thickness of its shell."""
-
-
-def shell_properties(shape: Shape) -> SolidProperties:
-    """Return area [m^2], centre and second moments [m^4] of the surface of a primitive.
-
-    Those of an ellipsoid are MuJoCo's approximations: Thomsen's for its area, and for its moments a shell
-    between it and one with larger half axes. Raises ArgumentError for another shape.
-    """
-    if isinstance(shape, Box):
-        x, y, z = shape.size
-        sides = 2.0 * np.array([y * z, z * x, x * y])
-        # Across a pair of sides all points are at half the edge, along them they are spread evenly.
-        squares = np.array([x * x, y * y, z * z]) * (sides / 4.0 + (sides.sum() - sides) / 12.0)
-        return SolidProperties(float(sides.sum()), np.zeros(3), _diagonal(*squares.tolist()))
-    if isinstance(shape, Sphere):
-        return _round_shell(shape.radius, 0.0, ends="balls")
-    if isinstance(shape, Cylinder | Capsule):
-        ends = "discs" if isinstance(shape, Cylinder) else "balls"
-        return _round_shell(shape.radius, shape.length, ends=ends)
-    if isinstance(shape, Ellipsoid):
-        return _ellipsoid_shell(*shape.radii)
-    raise ArgumentError(f"the surface of a {type(shape).__name__} has no closed form here")
-
-
-def _round_shell(radius: float, length: float, *, ends: str) -> SolidProperties:
-    """Return the properties of the wall of a tube with two discs, or two half spheres, as its ends."""
-    wall, half, square = 2.0 * math.pi * radius * length, length / 2.0, radius * radius
-    if ends == "discs":
-        closed = 2.0 * math.pi * square
-        xx, zz = closed * square / 4.0, closed * half * half
-    else:
-        closed = 4.0 * math.pi * square
-        # The centre of a half sphere is half its radius above its rim.
-        xx, zz = closed * square / 3.0, closed * (square / 3.0 + half * half + half * radius)
-    xx, zz = xx + wall * square / 2.0, zz + wall * length * length / 12.0
-    return SolidProperties(wall + closed, np.zeros(3), _diagonal(xx, xx, zz))
-
-
-def _ellipsoid_shell(a: float, b: float, c: float) -> SolidProperties:
-    power, e = 1.6075, SHELL_THICKNESS
-    mean = ((a * b) ** power + (b * c) ** power + (c * a) ** power) / 3.0
-    area = 4.0 * math.pi * mean ** (1.0 / power)
-    # Differences of the two ellipsoids, without the cancellation of subtracting them.
-    inner, growth = a * b * c, e * (a * b + b * c + c * a) + e * e * (a + b + c) + e**3
-    squares = [area / 5.0 * ((half + e) ** 2 + inner / growth * e * (2.0 * half + e)) for half in (a, b, c)]
-    return SolidProperties(area, np.zeros(3), _diagonal(*squares))
-
-
-def cone_properties(radius: float, length: float) -> SolidProperties:
-    """Return the properties of a cone about z whose origin is halfway [m] between base and tip, which is
-    up."""
-    volume = math.pi * radius**2 * length / 3.0
-    square = 3.0 / 20.0 * radius**2
-    moments = volume * _diagonal(square, square, 3.0 / 80.0 * length**2)
-    return SolidProperties(volume, np.array([0.0, 0.0, -length / 4.0]), moments)
 
 
 def inertial_of(properties: SolidProperties, line: int | None) -> Inertial:
@@ -136,13 +78,9 @@ def inertial_of(properties: SolidProperties, line: int | None) -> Inertial:
     return Inertial(properties.volume, Pose((x, y, z)), xx, xy, xz, yy, yz, zz, line=line)
 
 
-def _diagonal(xx: float, yy: float, zz: float) -> Floats:
-    """Return the inertia of unit mass with these mean squares of x, y and z."""
-    return np.diag([yy + zz, xx + zz, xx + yy])
-
-
-def _point_inertia(p: Floats) -> Floats:
-    return np.asarray(p @ p * np.eye(3) - np.outer(p, p))
+def diagonal_inertia(xx: float, yy: float, zz: float, mass: float = 1.0) -> Floats:
+    """Return the inertia of a mass with these mean squares of x, y and z."""
+    return mass * np.diag([yy + zz, xx + zz, xx + yy])
 
 
 def _capsule(radius: float, length: float) -> SolidProperties:
@@ -150,7 +88,7 @@ def _capsule(radius: float, length: float) -> SolidProperties:
     tube, ball = math.pi * radius**2 * length, 4.0 / 3.0 * math.pi * radius**3
     xx = (tube / 4 + ball / 5) * radius**2
     zz = tube * length**2 / 12 + ball * (radius**2 / 5 + length**2 / 4 + 3 * length * radius / 8)
-    return SolidProperties(tube + ball, np.zeros(3), _diagonal(xx, xx, zz))
+    return SolidProperties(tube + ball, np.zeros(3), diagonal_inertia(xx, xx, zz))
 
 
 def polyhedron_properties(

@@ -73,9 +73,9 @@ def _document(
         require_classes(tree, defaults, reading)
     options = read_options(root, reading)
     document = MjcfText(root, compiler, defaults, main_class, reading, options, folders)
-    attachments = _Attachments(document, source, around)
-    attachments.expand()
-    copies = _Replicates(document, attachments.sections)
+    attacher = _Attacher(document, source, around)
+    attacher.expand()
+    copies = _Replicates(document, attacher.sections)
     for tree in root.all("worldbody"):
         copies.expand(tree)
     return document
@@ -108,7 +108,7 @@ _NAMED_BY_FILES = frozenset(["mesh", "hfield", "texture"])
 _KINDS = {"freejoint": "joint"}
 
 
-class _Names:
+class _NamesByKind:
     """Names of the elements of subtrees and sections, by kind."""
 
     def __init__(self) -> None:
@@ -196,7 +196,7 @@ class _Child:
     prefixes: set[str] = field(default_factory=set)
 
 
-class _Attachments:
+class _Attacher:
     """Replaces each ``<attach>`` by what it attaches."""
 
     def __init__(self, document: MjcfText, source: str, around: tuple[str, ...]) -> None:
@@ -392,7 +392,7 @@ class _Attachments:
 
     def _refer(self, parts: Sequence[Element], sections: Sequence[Element], copier: _Copier) -> None:
         """Copy the elements of sections that refer to nothing but the parts of bodies that are attached."""
-        names = _Names()
+        names = _NamesByKind()
         for part in parts:
             names.add(part)
         for tag in _SECTIONS:
@@ -499,7 +499,7 @@ class _Replicates:
 
     def _copy_referring(self, element: Element, suffixes: Sequence[str]) -> None:
         """Replace elements that attached models brought, and that refer to what is copied, by a copy each."""
-        names = _Names()
+        names = _NamesByKind()
         for child in element.children:
             names.add(child)
         for section in self._attached:

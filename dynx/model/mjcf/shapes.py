@@ -27,7 +27,8 @@ from dynx.model.geometry import (
 )
 from dynx.model.geometry.mesh_inertia import mesh_properties
 from dynx.model.geometry.shapes import MAX_HEIGHTS
-from dynx.model.geometry.solids import Shape, SolidProperties, shell_properties, solid_properties
+from dynx.model.geometry.shells import shell_properties
+from dynx.model.geometry.solids import Shape, SolidProperties, solid_properties
 from dynx.model.mjcf.document import MjcfText, stem
 from dynx.model.xml.reading import Element
 from dynx.spatial.scalar import Floats

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -27,7 +28,7 @@ from dynx.model.geometry.mesh_inertia import mesh_properties
 from dynx.model.geometry.solids import (
     Shape,
     SolidProperties,
-    cone_properties,
+    diagonal_inertia,
     inertial_of,
     solid_properties,
 )
@@ -193,7 +194,7 @@ class LinkShapeReader:
             return None
         try:
             if shape.tag == "cone":
-                return cone_properties(*self._sizes(shape, what))
+                return _cone_properties(*self._sizes(shape, what))
             if shape.tag == "mesh":
                 return mesh_properties(self._mesh(shape, what), "exact")
             if shape.tag in ("box", "sphere", "cylinder", "capsule", "ellipsoid"):
@@ -234,3 +235,12 @@ class LinkShapeReader:
 
 def _what(element: Element, link: NamedPart) -> str:
     return f"{element.tag} {shown(element.attributes.get('name', ''))} of {link.what}"
+
+
+def _cone_properties(radius: float, length: float) -> SolidProperties:
+    """Return the properties of a cone about z whose origin is halfway [m] between base and tip, which is
+    up."""
+    volume = math.pi * radius**2 * length / 3.0
+    square = 3.0 / 20.0 * radius**2
+    moments = volume * diagonal_inertia(square, square, 3.0 / 80.0 * length**2)
+    return SolidProperties(volume, np.array([0.0, 0.0, -length / 4.0]), moments)

@@ -127,10 +127,9 @@ class _ShapeReader:
             return Box(reading.vector(shape, "size", what))
         if shape.tag == "sphere":
             return Sphere(reading.number(shape, "radius", what))
-        if shape.tag == "cylinder":
-            return Cylinder(reading.number(shape, "radius", what), reading.number(shape, "length", what))
-        if shape.tag == "capsule":
-            return Capsule(reading.number(shape, "radius", what), reading.number(shape, "length", what))
+        if shape.tag in ("cylinder", "capsule"):
+            kind = Cylinder if shape.tag == "cylinder" else Capsule
+            return kind(reading.number(shape, "radius", what), reading.number(shape, "length", what))
         if shape.tag == "ellipsoid":
             return Ellipsoid(reading.vector(shape, "radii", what))
         if shape.tag == "mesh":

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from dynx.errors import ArgumentError
 from dynx.model.geometry import Ellipsoid, Sphere, solid_properties
 from dynx.model.geometry.ray_casting import cast_on_shape
-from dynx.model.geometry.solids import polyhedron_properties, shell_properties
+from dynx.model.geometry.shells import shell_properties
+from dynx.model.geometry.solids import polyhedron_properties
+from dynx.model.geometry.triangulation import BALL_DEVIATION
 
 radii = st.tuples(*[st.floats(0.01, 5.0)] * 3)
 
@@ -24,12 +26,12 @@ def test_the_polyhedron_is_as_near_as_it_says(half_axes: tuple[float, float, flo
     normals = np.cross(b - a, c - a)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     offsets = np.einsum("ij,ij->i", normals, a)
-    assert np.linalg.norm(inner, axis=1).max() <= 1.0 + Ellipsoid.MESH_DEVIATION
-    assert offsets.min() >= 1.0 - Ellipsoid.MESH_DEVIATION
+    assert np.linalg.norm(inner, axis=1).max() <= 1.0 + BALL_DEVIATION
+    assert offsets.min() >= 1.0 - BALL_DEVIATION
     # Convex: no vertex is above the plane of a triangle.
     assert (inner @ normals.T <= offsets + 1e-12).all()
     found, exact = polyhedron_properties(vertices, faces), solid_properties(shape)
-    assert found.volume == pytest.approx(exact.volume, rel=3.0 * Ellipsoid.MESH_DEVIATION)
+    assert found.volume == pytest.approx(exact.volume, rel=3.0 * BALL_DEVIATION)
 
 
 @given(radii, st.integers(0, 1000))

@@ -13,7 +13,7 @@ from hypothesis import given
 import dynx
 from dynx.errors import ArgumentError, DescriptionError, UnsupportedFeatureError
 from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere
-from dynx.model.geometry.solids import SHELL_THICKNESS
+from dynx.model.geometry.shells import SHELL_THICKNESS
 from tests.model.mjcf.models import compute, models
 
 mujoco = pytest.importorskip("mujoco")
