@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import Any, Literal, TypedDict
 
@@ -20,11 +21,19 @@ from dynx.cli.shell.output import (
     write_json,
 )
 from dynx.errors import ArgumentError, nearest, shown
-from dynx.model.conversion import SUFFIXES, Conversion, Format, holds, without_collision_faults
+from dynx.model.conversion import (
+    SUFFIXES,
+    Conversion,
+    Format,
+    holds,
+    without_collision_faults,
+    without_shapes,
+)
 from dynx.model.conversion import convert as convert_model
 from dynx.model.geometry import Mesh
 from dynx.model.loading import split_arguments
 from dynx.model.model import Model
+from dynx.same import same_robot
 
 
 class ConvertDocument(TypedDict):
@@ -59,7 +68,7 @@ def convert(
     if out is not None:
         check_writable(out)
         require_apart([out], [split_arguments(robot["robot"])[0], model.source, *_asset_files(model)], _KEPT)
-    found = convert_model(model, target, "robot" if out is None else PurePath(out).stem)
+    found = _certified(model, convert_model(model, target, "robot" if out is None else PurePath(out).stem))
     _keep_json_apart(json_path, out, found, model)
     written: list[str] = []
     if out is not None and not found.differences:
@@ -86,11 +95,23 @@ def convert(
 _KEPT = "a file that is read"
 
 
+def _certified(model: Model, found: Conversion) -> Conversion:
+    """Return a conversion with what differs in some state as differences, if no part differs by itself."""
+    if found.robot is None or found.differences:
+        return found
+    report = same_robot(without_shapes(model), found.robot)
+    missing = [each.message for each in report.unmatched]
+    differences = (*missing, *(each.message for each in report.differences))
+    return found if report.same else replace(found, differences=differences)
+
+
 def _format(to: Format | None, out: str | None) -> Format:
     """Return the format of the document: that of ``--to``, else that of the suffix of the output file."""
     if out is None:
         if to is None:
-            raise ArgumentError("--to is missing; wanted mjcf or urdf, or an output file in .xml or .urdf")
+            raise ArgumentError(
+                "--to is missing; wanted mjcf, sdf or urdf, or an output file in .xml, .sdf or .urdf"
+            )
         return to
     suffix = PurePath(out).suffix.lower()
     by_suffix = {each: name for name, suffixes in SUFFIXES.items() for each in suffixes}
@@ -102,7 +123,7 @@ def _format(to: Format | None, out: str | None) -> Format:
             f"--out {shown(out, 300)} has the suffix of {by_suffix[suffix]}, and --to is {to}; wanted "
             f"{' or '.join(SUFFIXES[to])}"
         )
-    return "urdf" if by_suffix[suffix] == "urdf" else "mjcf"
+    return by_suffix[suffix]
 
 
 def _asset_files(model: Model) -> list[str]:
@@ -145,7 +166,9 @@ def _check_free(out: str, found: Conversion, model: Model, *, overwrite: bool) -
 
 
 def _plain_text(model: Model, to: Format) -> str:
-    return without_collision_faults(model).to_urdf(geometry=True) if to == "urdf" else model.to_mjcf()
+    if to == "urdf":
+        return without_collision_faults(model).to_urdf(geometry=True)
+    return model.to_mjcf() if to == "mjcf" else model.to_sdf()
 
 
 def _show(document: ConvertDocument, out: str | None) -> None:

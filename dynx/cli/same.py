@@ -21,7 +21,7 @@ from dynx.cli.shell.output import (
 from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
 from dynx.errors import ArgumentError, shown
 from dynx.files.writing import write_bytes
-from dynx.model.conversion import SUFFIXES
+from dynx.model.conversion import SUFFIXES, Format
 from dynx.model.loading import read_description, split_arguments
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
@@ -34,7 +34,7 @@ MAX_CELL = 40
 MAX_MESSAGE = 60
 """Largest number of characters of a message in a table."""
 
-FORMATS = {"robot": "urdf", "mujoco": "mjcf"}
+FORMATS: dict[str, Format] = {"robot": "urdf", "mujoco": "mjcf"}
 """Formats that are mended, by the root element of their files."""
 
 

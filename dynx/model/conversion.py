@@ -37,15 +37,24 @@ from dynx.model.geometry.asset_files import AssetFiles
 from dynx.model.loading import load
 from dynx.model.mjcf.writer import MESH_SUFFIXES, RobotWriter
 from dynx.model.model import Model
+from dynx.model.sdf.writer import SdfWriter
 from dynx.model.urdf.writer import urdf_notes, urdf_text
 from dynx.spatial.scalar import Floats
 
-Format = Literal["mjcf", "urdf"]
+Format = Literal["mjcf", "sdf", "urdf"]
 
-SUFFIXES: Mapping[str, tuple[str, ...]] = {"mjcf": (".xml", ".mjcf"), "urdf": (".urdf",)}
+SUFFIXES: Mapping[Format, tuple[str, ...]] = {
+    "mjcf": (".xml", ".mjcf"),
+    "sdf": (".sdf",),
+    "urdf": (".urdf",),
+}
 """Suffixes of the files of each format; the first is that of a file without a name."""
 
-_COPIED: Mapping[str, tuple[str, ...]] = {"mjcf": MESH_SUFFIXES, "urdf": (".stl", ".obj", ".dae", ".glb")}
+_COPIED: Mapping[Format, tuple[str, ...]] = {
+    "mjcf": MESH_SUFFIXES,
+    "sdf": (".obj",),
+    "urdf": (".stl", ".obj", ".dae", ".glb"),
+}
 """Formats of meshes that are copied; others are written as OBJ."""
 
 ROUNDING = 1e-12
@@ -66,6 +75,8 @@ class Conversion:
     """Sentences on what the document, read back, does not say of the robot; empty for the same robot."""
     shape_differences: tuple[str, ...] = ()
     """Sentences on shapes that the document lacks or states differently."""
+    robot: Model | None = None
+    """The robot that the document, read back, states, without its shapes; None where it is not read."""
 
     def write(self, path: str | os.PathLike[str]) -> list[str]:
         """Write the document, and its files beside it; return the paths, the document last.
@@ -97,8 +108,13 @@ def convert(model: Model, to: Format, stem: str = "robot") -> Conversion:
         )
         notes = tuple(urdf_notes(model))
     else:
-        writer = RobotWriter(model, assets.mesh_path, assets.image_path)
+        writer = (
+            RobotWriter(model, assets.mesh_path, assets.image_path)
+            if to == "mjcf"
+            else SdfWriter(model, assets.mesh_path)
+        )
         text, notes = writer.text(), tuple(writer.notes)
+    read = None
     with temporary_folder() as folder:
         path = Path(folder) / f"{stem}{SUFFIXES[to][0]}"
         write_document(path, text, assets.files, sync=False)
@@ -106,9 +122,16 @@ def convert(model: Model, to: Format, stem: str = "robot") -> Conversion:
             back = load(path)
             differences = tuple(robot_differences(model, back))
             shapes = tuple(shape_differences(model, back))
+            # Its meshes are gone with the folder.
+            read = without_shapes(back)
         except DynxError as error:
             differences, shapes = (f"the document is not read back: {error}",), ()
-    return Conversion(to, text, notes, assets.files, differences, shapes)
+    return Conversion(to, text, notes, assets.files, differences, shapes, read)
+
+
+def without_shapes(model: Model) -> Model:
+    """Return a robot without its shapes."""
+    return replace(model, geometry=Geometry({}).for_links(link.name for link in model.links))
 
 
 def without_collision_faults(model: Model) -> Model:

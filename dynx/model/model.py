@@ -96,12 +96,11 @@ class Model(Tree):
 
     @door("dynx.model.urdf.writer:write_urdf")
     def to_urdf(self, *, geometry: bool = False) -> str:
-        """Return the robot as URDF text in canonical form: one element a line, and nothing that has its
-        default.
+        """Return the robot as URDF text in canonical form: one element a line, nothing that has its default.
 
-        `dynx.load` of the text returns an equal model; equality ignores shapes, which `geometry` adds.
-        Extensions that other readers ignore state what URDF cannot: gravity, the base, locked joints, frames.
-        Raises DescriptionError for a name, a number or a shape that URDF cannot express.
+        `dynx.load` of the text returns an equal model; equality ignores shapes, which `geometry` adds. Others
+        ignore the extensions that state what URDF cannot: gravity, the base, locked joints, frames. Raises
+        DescriptionError for a name, a number or a shape that URDF cannot express.
         """
         raise NotImplementedError
 
@@ -109,10 +108,12 @@ class Model(Tree):
     def to_mjcf(self) -> str:
         """Return the robot as MJCF text, MuJoCo's format, with comments on what that cannot say.
 
-        `dynx.load` of the text returns a model with the same links, joints, frames, inertias, limits and
-        coefficients, to rounding. Bodies, joints and sites have the names of links, joints and frames.
-        Raises DescriptionError and UnsupportedFeatureError for what MJCF cannot express.
-        """
+        `dynx.load` of it returns the same robot. Raises DescriptionError for what MJCF cannot express."""
+        raise NotImplementedError
+
+    @door("dynx.model.sdf.writer:write_sdf")
+    def to_sdf(self) -> str:
+        """Return the robot as SDF text, Gazebo's format, as `to_mjcf` does."""
         raise NotImplementedError
 
     @cached_property

@@ -18,6 +18,7 @@ DOORS = {
     "dynx.backends.base:Backend.inverse_kinematics": "dynx.ik.solver:inverse_kinematics",
     "dynx.backends.base:Backend.track": "dynx.ik.tracking.tracker:track",
     "dynx.backends.base:Backend.velocity_ik": "dynx.ik.velocity:velocity_ik",
+    "dynx.model.model:Model.to_sdf": "dynx.model.sdf.writer:write_sdf",
     "dynx.model.model:Model.to_mjcf": "dynx.model.mjcf.writer:write_mjcf",
     "dynx.model.model:Model.to_urdf": "dynx.model.urdf.writer:write_urdf",
     "dynx.model.model:Model.view": "dynx.viewer.viewer:view",

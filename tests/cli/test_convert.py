@@ -30,7 +30,7 @@ def test_a_robot_is_written_with_its_meshes_and_is_the_same(tmp_path: Path) -> N
     assert [*robot_differences(dynx.load("double_pendulum"), dynx.load(again))] == []
 
 
-@pytest.mark.parametrize("to", ["mjcf", "urdf"])
+@pytest.mark.parametrize("to", ["mjcf", "sdf", "urdf"])
 def test_without_a_file_the_document_is_printed(to: str) -> None:
     result = run("double_pendulum", "--to", to)
     assert result.exit_code == 0

@@ -30,7 +30,7 @@ from dynx.model.geometry import (
 )
 from dynx.testing.strategies import models
 
-FORMATS: tuple[Format, ...] = ("mjcf", "urdf")
+FORMATS: tuple[Format, ...] = ("mjcf", "sdf", "urdf")
 CUBE = Inertial(1.0, ixx=1.0, iyy=1.0, izz=1.0)
 
 
@@ -213,7 +213,7 @@ def test_missing_meshes_are_named_and_the_rest_is_written(tmp_path: Path) -> Non
     assert any("gone.stl" in each for each in convert(model, "urdf").notes)
 
 
-@pytest.mark.parametrize("to", ["mjcf", "urdf"])
+@pytest.mark.parametrize("to", ["mjcf", "sdf", "urdf"])
 def test_shapes_that_are_not_read_are_named_and_the_robot_is_written(tmp_path: Path, to: Format) -> None:
     path = tmp_path / "robot.urdf"
     path.write_text(
@@ -229,7 +229,7 @@ def test_shapes_that_are_not_read_are_named_and_the_robot_is_written(tmp_path: P
     assert any("'b'" in each for each in found.shape_differences)
 
 
-@pytest.mark.parametrize("to", ["mjcf", "urdf"])
+@pytest.mark.parametrize("to", ["mjcf", "sdf", "urdf"])
 @given(count=st.integers(2, 9))
 def test_notes_of_one_kind_are_one_note(to: Format, count: int) -> None:
     shapes = (Capsule(0.1, 0.2), Plane())
@@ -238,8 +238,8 @@ def test_notes_of_one_kind_are_one_note(to: Format, count: int) -> None:
     joints = [Joint(f"j{n}", "continuous", f"a{n}", f"a{n + 1}") for n in range(count - 1)]
     model = Model.build("r", links, joints, geometry=Geometry({link.name: each for link in links}))
     notes = [note for note in convert(model, to).notes if "MuJoCo has" not in note]
-    assert len(notes) == 2
-    assert sum(f"{count} times" in note for note in notes) == (2 if to == "urdf" else 0)
+    assert len(notes) == {"mjcf": 2, "sdf": 1, "urdf": 2}[to]
+    assert sum(f"{count} times" in note for note in notes) == {"mjcf": 0, "sdf": 1, "urdf": 2}[to]
     assert sum(f"{2 * count - 1} times" in note for note in notes) == (1 if to == "mjcf" else 0)
 
 

@@ -13,9 +13,9 @@ from dynx.cli.shell.options import gravity_option, json_option, model_options, o
 @click.option(
     "--to",
     "to",
-    type=one_of("mjcf", "urdf"),
+    type=one_of("mjcf", "sdf", "urdf"),
     metavar="FORMAT",
-    help="Format of the document: mjcf or urdf (default: by the suffix of the output file).",
+    help="Format of the document: mjcf, sdf or urdf (default: by the suffix of the output file).",
 )
 @click.option(
     "-o",
@@ -32,11 +32,11 @@ from dynx.cli.shell.options import gravity_option, json_option, model_options, o
 @silent_option
 @runs("dynx.cli.convert:convert")
 def convert() -> None:
-    """Write ROBOT as MJCF or URDF, with its meshes and materials.
+    """Write ROBOT as MJCF, SDF or URDF, with its meshes and materials.
 
     The document is read back and compared before it is written: links, joints, frames, inertias, limits and
-    coefficients are the same to rounding. What the format cannot say is listed with its effect. Meshes in
-    formats that MuJoCo does not read become OBJ files.
+    coefficients are the same to rounding, and both are one robot in every state (dynx same). What the format
+    cannot say is listed with its effect. Meshes that MuJoCo or Drake do not read become OBJ files.
 
     Exit code 0 if the document is written, 1 if it would be another robot, 2 if the robot cannot be used or
     the format cannot express it.
@@ -46,4 +46,5 @@ def convert() -> None:
       dynx convert robot.urdf --to mjcf -o robot.xml
       dynx convert panda -o panda.xml --lock panda_finger_joint1=0.02
       dynx convert robot.xml --to urdf
+      dynx convert ur5 -o ur5.sdf
     """

@@ -181,6 +181,11 @@ class Scope:
         return inner if rest == MODEL_FRAME else inner.find(rest)
 
 
+def is_reserved(name: str) -> bool:
+    """Check whether the format keeps a name for itself."""
+    return name == WORLD or (name.startswith("__") and name.endswith("__"))
+
+
 def read_document(
     data: str | bytes, source: str, package_dirs: Iterable[StrPath]
 ) -> tuple[Scope, SdfReading] | None:
@@ -334,8 +339,7 @@ class _ScopeReader:
             raise reading.error(
                 element, f"the file has more than {MAX_PARTS} links, joints, frames and shapes"
             )
-        reserved = name == WORLD or (name.startswith("__") and name.endswith("__"))
-        if reserved and (kind == "link" or scope.version >= (1, 7)):
+        if is_reserved(name) and (kind == "link" or scope.version >= (1, 7)):
             raise reading.error(element, f"{part.what} has a name that the format keeps for itself")
         other = scope.parts.get(name) or scope.models.get(name)
         if isinstance(other, NamedPart) and (other.kind == kind or scope.version >= (1, 7)):

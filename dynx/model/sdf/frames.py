@@ -6,6 +6,8 @@ in ``relative_to``, else in the frame of the element around; a joint stands in i
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from dynx.errors import nearest, shown
@@ -17,6 +19,9 @@ from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy
 
 _IDENTITY = np.eye(4)
 
+MAX_NEAR = 8
+"""Largest number of frames from one to that in which two frames are compared by the numbers of the file."""
+
 Frame = NamedPart | Scope
 
 
@@ -26,6 +31,7 @@ class Frames:
     def __init__(self, reading: SdfReading) -> None:
         self._reading = reading
         self._poses: dict[int, Floats] = {}
+        self._stated: dict[int, Floats] = {}
         self._links: dict[int, NamedPart | None] = {}
         self._open: set[int] = set()
 
@@ -73,8 +79,43 @@ class Frames:
             return _IDENTITY
         scope_a, scope_b = (each.scope if isinstance(each, NamedPart) else each for each in (a, b))
         if scope_a is scope_b and a is not None and b is not None:
-            return inverse(self.in_scope(a)) @ self.in_scope(b)
+            self.in_scope(a), self.in_scope(b)  # raise the errors of all that they are stated in
+            near = self._by_near_frame(a, b)
+            return inverse(self.in_scope(a)) @ self.in_scope(b) if near is None else near
         return inverse(self._in_world(a)) @ self._in_world(b)
+
+    def _by_near_frame(self, a: Frame, b: Frame) -> Floats | None:
+        """Return the pose (4, 4) of frame b in frame a of one scope by way of a near frame that both are
+        stated in, so that one that is stated in a has the numbers of the file; None without such a frame."""
+        near_a, near_b = ([*self._stated_chain(each)] for each in (a, b))
+        places = {id(frame): pose for frame, pose in near_a}
+        for frame, second in near_b:
+            first = places.get(id(frame))
+            if first is not None:
+                return second if frame is a else inverse(first) @ second
+        return None
+
+    def _stated_chain(self, frame: Frame) -> Iterator[tuple[Frame, Floats]]:
+        """Yield a frame, the one that its pose is stated in, and so on in their scope, each with the pose
+        (4, 4) of the first in it; at most `MAX_NEAR`."""
+        pose, each = _IDENTITY, frame
+        yield each, pose
+        for _ in range(MAX_NEAR):
+            if isinstance(each, Scope):
+                return
+            stated = self._stated_in(each)
+            inside = isinstance(stated, NamedPart) and stated.scope is each.scope
+            if not (inside or stated is None or stated is each.scope):
+                return
+            pose = self._stated_pose(each) @ pose if pose is not _IDENTITY else self._stated_pose(each)
+            each = stated if isinstance(stated, NamedPart) else each.scope
+            yield each, pose
+
+    def _stated_pose(self, part: NamedPart) -> Floats:
+        """Return the pose (4, 4) that a part states, read once."""
+        if id(part) not in self._stated:
+            self._stated[id(part)] = self.stated(self._reading.only(part.element, "pose"), part.what)
+        return self._stated[id(part)]
 
     def in_scope(self, frame: Frame) -> Floats:
         """Return the pose (4, 4) of a part in the frame of its scope; of a scope that is the identity."""
@@ -171,8 +212,7 @@ class Frames:
         return np.asarray(turned)
 
     def _resolved(self, part: NamedPart) -> Floats:
-        pose = self.stated(self._reading.only(part.element, "pose"), part.what)
-        other = self._stated_in(part)
+        pose, other = self._stated_pose(part), self._stated_in(part)
         return pose if other is None else self._seen_from(part.scope, other) @ pose
 
     def _placement(self, scope: Scope) -> Floats:

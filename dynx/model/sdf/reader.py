@@ -31,6 +31,7 @@ from dynx.model.elements import (
 from dynx.model.geometry import Geometry
 from dynx.model.package_search import StrPath
 from dynx.model.sdf.document import ONE_ROBOT, WORLD, NamedPart, Scope, SdfReading, read_document
+from dynx.model.sdf.extension import GEAR_RATIO, HOLD, LIMITS, LOCKED, NAME, ROTOR_INERTIA
 from dynx.model.sdf.frames import Frames
 from dynx.model.sdf.shapes import LinkShapeReader
 from dynx.model.tree import STANDARD_GRAVITY, Base, Description
@@ -107,6 +108,7 @@ class _RobotReader:
         self._springs: list[tuple[str, Element]] = []
         self._prefixes: dict[int, str] = {id(top): ""}
         self._parts = list(top.walk())
+        self._own_names: dict[int, str] = {}
         self._name_scopes()
         self._taken = {self._name(part) for part in self._parts if part.kind == "link"} | {WORLD}
         self._joint_names: set[str] = set()
@@ -118,9 +120,14 @@ class _RobotReader:
         reading = self._reading
         links = [part for part in self._parts if part.kind == "link"]
         connections = list(self._connections())
+        held = self._take_hold(connections)
         components = self._components(links, connections)
         root = self._root(components, connections)
-        base: Base = "fixed" if root is None else "floating"
+        if held is not None and root is not held.child:
+            raise reading.error(
+                held.child.element, f"{held.child.what} is held by <{HOLD}> and is not the root"
+            )
+        base: Base = "fixed" if root is None or held is not None else "floating"
         inside = {id(part) for part in components[0 if root is None else id(root)]}
         if root is None:
             self._links.append(Link(WORLD, Inertial(), self._top.element.line))
@@ -129,7 +136,10 @@ class _RobotReader:
             self._links.append(Link(self._name(part), self._inertial(part), part.element.line))
         self._join(root, [each for each in connections if id(each.child) in inside])
         geometry = Geometry({self._name(part): self._shapes.geometry(part) for part in read})
-        if root is not None:
+        base_pose = IDENTITY
+        if root is not None and held is not None:
+            base_pose = _pose(self._frames.between(None, root))
+        elif root is not None:
             self._note_start(root)
         frames = self._frames_of({id(part) for part in read}, root)
         gravity = self._gravity(read)
@@ -144,6 +154,7 @@ class _RobotReader:
             geometry,
             base=base,
             gravity=gravity,
+            base_pose=base_pose,
         )
 
     # -- names ----------------------------------------------------------------------------------
@@ -167,14 +178,22 @@ class _RobotReader:
         self._robot = robot
 
     def _name(self, part: NamedPart) -> str:
-        return self._prefixes[id(part.scope)] + part.name
+        if id(part) not in self._own_names:
+            own = self._own_name(part)
+            self._own_names[id(part)] = self._prefixes[id(part.scope)] + own
+        return self._own_names[id(part)]
 
-    def _robot_name(self) -> str:
-        name = self._top.name if self._robot is None else self._robot.name
+    def _own_name(self, part: NamedPart | Scope) -> str:
+        """Return the name of a part, which may be one that the format does not accept."""
+        name = self._reading.word(part.element, NAME, part.what) or part.name
         fault = name_fault(name)
         if fault is not None:
-            raise self._reading.error(self._top.element, f"the name of the model {fault}")
+            raise self._reading.error(part.element, f"the name of {part.what} {fault}")
         return name
+
+    def _robot_name(self) -> str:
+        top = self._top if self._robot is None else self._robot
+        return top.name if top.is_world else self._own_name(top)
 
     # -- which links are the robot ----------------------------------------------------------------
 
@@ -202,6 +221,23 @@ class _RobotReader:
         if held:
             more = f" and {len(held) - 1} others" if len(held) > 1 else ""
             self._reading.note(held[0].element, f"{held[0].what}{more} cannot move: the model is static")
+
+    def _take_hold(self, connections: list[_Connection]) -> _Connection | None:
+        """Take out the joint that holds the root of a fixed base in the world, if one is marked as such."""
+        marked = [each for each in connections if each.joint is not None and each.joint.element.all(HOLD)]
+        for each in marked:
+            assert each.joint is not None
+            what, element = each.joint.what, each.joint.element
+            if each.parent is not None or _kind(each.joint) != "fixed":
+                raise self._reading.error(
+                    element, f"{what} has <{HOLD}>; wanted it in a fixed joint whose parent is the world"
+                )
+            if sum(other.parent is None for other in connections) > 1:
+                raise self._reading.error(
+                    element, f"{what} has <{HOLD}>, and the world holds another link, too; wanted one"
+                )
+            connections.remove(each)
+        return marked[0] if marked else None
 
     def _components(
         self, links: list[NamedPart], connections: list[_Connection]
@@ -323,7 +359,9 @@ class _RobotReader:
             )
         line = joint.element.line
         if not axes:
-            self._joints.append(Joint(name, "fixed", first, last, _pose(at), line=line))
+            locked = self._reading.one(joint.element, LOCKED, joint.what)
+            locked_at = None if locked is None else self._reading.number(locked, LOCKED, joint.what)
+            self._joints.append(Joint(name, "fixed", first, last, _pose(at), locked_at=locked_at, line=line))
             return
         R, point = place[:3, :3], place[:3, 3]
         above = first
@@ -372,7 +410,7 @@ class _RobotReader:
                 origin,
                 axis=(x, y, z),
                 limits=limits,
-                dynamics=self._dynamics(axis.element, what),
+                dynamics=self._dynamics(axis.element, joint, what),
                 mimic=self._mimic(axis.element, joint, what),
                 line=joint.element.line,
             )
@@ -420,14 +458,17 @@ class _RobotReader:
         limit = reading.only(axis, "limit")
         if limit is None:
             return Limits()
-        lower = self._limit(limit, "lower", what, -INFINITY)
-        upper = self._limit(limit, "upper", what, INFINITY)
+        own = {
+            name: reading.scalar(limit, tag, what, INFINITY) for name, tag in LIMITS.items() if limit.all(tag)
+        }
+        lower = own.get("lower", self._limit(limit, "lower", what, -INFINITY))
+        upper = own.get("upper", self._limit(limit, "upper", what, INFINITY))
         if lower > upper:
             raise reading.error(limit, f"{what} has lower limit {lower:g} above upper limit {upper:g}")
         most = {}
         for tag in ("velocity", "effort"):
             value = self._limit(limit, tag, what, INFINITY)
-            most[tag] = INFINITY if value < 0.0 else value
+            most[tag] = own.get(tag, INFINITY if value < 0.0 else value)
         return Limits(lower, upper, **most)
 
     def _limit(self, limit: Element, tag: str, what: str, default: float) -> float:
@@ -440,11 +481,12 @@ class _RobotReader:
         value = self._reading.number(found, tag, what, bound=INFINITY)
         return value if abs(value) < UNLIMITED else float(np.copysign(INFINITY, value))
 
-    def _dynamics(self, axis: Element, what: str) -> JointDynamics:
+    def _dynamics(self, axis: Element, joint: NamedPart, what: str) -> JointDynamics:
         reading = self._reading
         dynamics = reading.only(axis, "dynamics")
+        armature = self._armature(joint)
         if dynamics is None:
-            return JointDynamics()
+            return JointDynamics(armature=armature)
         values = {each: reading.scalar(dynamics, each, what, 0.0) for each in ("damping", "friction")}
         for each, value in values.items():
             if value < 0.0:
@@ -452,7 +494,23 @@ class _RobotReader:
         reading.scalar(dynamics, "spring_reference", what, 0.0)
         if reading.scalar(dynamics, "spring_stiffness", what, 0.0):
             self._springs.append((what, dynamics))
-        return JointDynamics(**values)
+        return JointDynamics(**values, armature=armature)
+
+    def _armature(self, joint: NamedPart) -> float:
+        """Return the armature that Drake's elements give to a joint of one axis; others have no motor."""
+        reading, what = self._reading, joint.what
+        inertia, ratio = (
+            reading.scalar(joint.element, tag, what, default)
+            for tag, default in ((ROTOR_INERTIA, 0.0), (GEAR_RATIO, 1.0))
+        )
+        if inertia < 0.0:
+            raise reading.error(
+                joint.element, f"<{ROTOR_INERTIA}> of {what} is {inertia:g}; wanted at least 0"
+            )
+        if inertia and len(_TYPES[_kind(joint)]) > 1:
+            reading.note(joint.element, f"<{ROTOR_INERTIA}> of {what} is not used: it has two axes")
+            return 0.0
+        return inertia * ratio * ratio
 
     def _mimic(self, axis: Element, joint: NamedPart, what: str) -> Mimic | None:
         """Return the coupling of an axis: its position is multiplier (leader - reference) + offset."""

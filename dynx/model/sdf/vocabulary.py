@@ -1,11 +1,13 @@
 """Elements and attributes of SDF: those that dynx uses, and what it means that others are not read.
 
 The format is that of versions 1.4 to 1.12 (http://sdformat.org/spec). An element that stands in neither table
-is misspelt. One whose name has a prefix, such as ``drake:joint``, belongs to a program, and a ``<plugin>``
-may stand anywhere.
+is misspelt. One whose name has a prefix, such as ``drake:joint``, belongs to a program; those of
+`dynx.model.sdf.extension` are used. A ``<plugin>`` may stand anywhere.
 """
 
 from __future__ import annotations
+
+from dynx.model.sdf.extension import GEAR_RATIO, HOLD, LIMITS, LOCKED, NAME, ROTOR_INERTIA
 
 _NONE = "it moves no body"
 _LIGHT = "it is not drawn"
@@ -18,10 +20,10 @@ _STATE = "the state of the file is not used"
 USED: dict[str, str] = {
     "sdf": "model world",
     "world": "model include frame joint gravity physics",
-    "model": "model include frame joint link pose static",
+    "model": f"model include frame joint link pose static {NAME}",
     "include": "uri name pose static placement_frame",
-    "frame": "pose",
-    "link": "pose inertial collision visual gravity",
+    "frame": f"pose {NAME}",
+    "link": f"pose inertial collision visual gravity {NAME}",
     "inertial": "mass pose inertia density",
     "inertia": "ixx ixy ixz iyy iyz izz",
     "collision": "pose geometry density",
@@ -36,10 +38,10 @@ USED: dict[str, str] = {
     "plane": "normal",
     "mesh": "uri scale submesh",
     "material": "diffuse",
-    "joint": "pose parent child axis axis2",
+    "joint": f"pose parent child axis axis2 {NAME} {HOLD} {LOCKED} {ROTOR_INERTIA} {GEAR_RATIO}",
     "axis": "xyz use_parent_model_frame dynamics limit mimic",
     "dynamics": "damping friction spring_reference spring_stiffness",
-    "limit": "lower upper effort velocity",
+    "limit": f"lower upper effort velocity {' '.join(LIMITS.values())}",
     "mimic": "multiplier offset reference",
 }
 """Elements that are used, by the element around them."""
