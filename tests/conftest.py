@@ -15,6 +15,7 @@ from __future__ import annotations
 import gc
 import os
 import tempfile
+from collections import defaultdict
 from collections.abc import Generator
 from typing import Any
 from zlib import crc32
@@ -56,6 +57,11 @@ LONGEST = (
 """Beginnings of the names of tests that take up to a minute each."""
 
 
+CASES, LONG_CASES = 8, 2
+"""Largest number of cases of one test that run without ``--whole``, and of one with the mark ``long_cases``:
+each takes a good part of a second or more, and repeats the others on another robot, engine or kind."""
+
+
 LARGEST_CHUNK = 2
 """Largest number of tests that a parallel worker is given at a time."""
 
@@ -66,6 +72,7 @@ def pytest_configure(config: pytest.Config) -> None:
     Each kernel is compiled once, and no test depends on files of an earlier run. If DYNX_CACHE_DIR names a
     folder, that one is used and kept.
     """
+    config.addinivalue_line("markers", "long_cases: each case takes a good part of a second or more")
     # By default one worker gets an eighth of all tests at the start, with all of the longest among them.
     if getattr(config.option, "maxschedchunk", 0) is None:
         config.option.maxschedchunk = LARGEST_CHUNK
@@ -92,16 +99,37 @@ def pytest_collection() -> Generator[None, Any, Any]:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--one-in", type=int, default=1, metavar="N", help="run a random Nth of the quick tests")
+    parser.addoption("--whole", action="store_true", help="run every case of each test, not a few at random")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep the sample of ``--one-in``; put the longest tests first, so that parallel workers end together."""
+    """Keep the sample of ``--one-in``, and a few cases of each test if neither ``--whole`` nor a file is
+    given; put the longest tests first, so that parallel workers end together."""
     one_in = config.getoption("--one-in")
+    sample = list(items)
     if one_in > 1:
         sample = [item for item in items if is_quick(item) and crc32(item.nodeid.encode()) % one_in == 0]
+    elif not config.getoption("--whole") and not any(".py" in argument for argument in config.args):
+        sample = few_cases(items)
+    if len(sample) < len(items):
         config.hook.pytest_deselected(items=list(set(items) - set(sample)))
         items[:] = sample
     items.sort(key=is_quick)
+
+
+def few_cases(items: list[pytest.Item]) -> list[pytest.Item]:
+    """Return at most `CASES` or `LONG_CASES` cases of each test, at random, but the same ones in each run."""
+    tests: dict[str, list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        tests[item.nodeid.partition("[")[0]].append(item)
+    kept = {
+        item
+        for cases in tests.values()
+        for item in sorted(cases, key=lambda item: crc32(item.nodeid.encode()))[
+            : LONG_CASES if cases[0].get_closest_marker("long_cases") else CASES
+        ]
+    }
+    return [item for item in items if item in kept]
 
 
 @pytest.hookimpl(wrapper=True)

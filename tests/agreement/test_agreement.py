@@ -61,6 +61,7 @@ def test_no_tolerance_exceeds_the_promised_error() -> None:
         assert row.tolerance <= promised.get(row.quantity, 1e-12), row
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(("defect", "quantity"), DEFECTS, ids=[d.__name__ for d, _ in DEFECTS])
 @pytest.mark.parametrize("base", BASES)
 def test_a_defect_is_seen_and_its_backend_is_named(defect: type[Broken], quantity: str, base: Base) -> None:

@@ -150,6 +150,7 @@ def test_random_robots_in_50_digits(data: st.DataObject) -> None:
                 assert_close(got, np.asarray(S.T @ derivative, dtype=float), max(size, 1e-12), name)
 
 
+@pytest.mark.long_cases
 @each_model
 def test_all_forms_agree(model: Model) -> None:
     """In batches that fill the lanes, in parts of them, and in the array code that both are traced from."""

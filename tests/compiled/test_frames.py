@@ -42,6 +42,7 @@ def engine(request: pytest.FixtureRequest) -> CompiledBackend:
     return made(ROBOTS[request.param])
 
 
+@pytest.mark.long_cases
 @each_quantity
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @given(data=st.data())
@@ -68,6 +69,7 @@ def test_any_frame_of_any_robot(
     ErrorBounds(samples_at(model, drawn.q, drawn.v, drawn.a)).check(quantity, got, wanted)
 
 
+@pytest.mark.long_cases
 @each_quantity
 @pytest.mark.parametrize("engine", ["fixed", "floating mimic"], indirect=True)
 @pytest.mark.parametrize("size", [(), (3,), (MAX_COPIED_SAMPLES + 5,)])

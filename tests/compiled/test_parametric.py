@@ -50,6 +50,7 @@ def check_same(
     assert_close(dynamics.forward_dynamics(q, v, x, parameters), a, condition * float(np.max(np.abs(a))))
 
 
+@pytest.mark.long_cases
 @each_model
 @pytest.mark.parametrize("joint_dynamics", [False, True])
 def test_the_parameters_of_the_model_give_its_results(model: Model, joint_dynamics: bool) -> None:

@@ -51,6 +51,7 @@ SPELLINGS: tuple[Callable[[Floats], Any], ...] = (
 )
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("spelling", SPELLINGS, ids=lambda spelling: spelling.__name__)
 @each_call
 def test_any_array_of_the_same_numbers(
@@ -63,6 +64,7 @@ def test_any_array_of_the_same_numbers(
         engine_call.check(engine, state, result, engine_call.evaluate(engine, state))
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("dtype", ["float32", "float16", "int64", "int8", "uint8"])
 @each_call
 def test_other_real_numbers_are_converted_exactly(make: Make, engine_call: EngineCall, dtype: str) -> None:
@@ -120,6 +122,7 @@ SIZES = ((), (1,), (3,), (2, 3), (0,), (2, 0))
 each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 
 
+@pytest.mark.long_cases
 @each_model
 @each_call
 def test_shape_and_type_for_every_size_of_batch(make: Make, model: Model, engine_call: EngineCall) -> None:
@@ -132,6 +135,7 @@ def test_shape_and_type_for_every_size_of_batch(make: Make, model: Model, engine
         assert np.isfinite(result).all()
 
 
+@pytest.mark.long_cases
 @each_model
 @each_call
 def test_a_batch_is_its_samples(make: Make, model: Model, engine_call: EngineCall) -> None:

@@ -53,6 +53,7 @@ def alone(backend_name: str) -> dict[Call, Floats]:
     return {}
 
 
+@pytest.mark.long_cases
 def test_no_order_of_calls_changes_a_result(make: Make, backend_name: str, alone: dict[Call, Floats]) -> None:
     """Calls to several robots in any order, against each call to a new backend."""
     engines = [make(model) for model in MODELS]

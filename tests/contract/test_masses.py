@@ -19,6 +19,7 @@ MASSLESS = {"no inertial": None, "zero inertial": Inertial()}
 each_massless = pytest.mark.parametrize("inertial", MASSLESS.values(), ids=MASSLESS.keys())
 
 
+@pytest.mark.long_cases
 @each_massless
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @each_call

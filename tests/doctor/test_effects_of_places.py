@@ -71,6 +71,7 @@ def rules_at_two_places() -> tuple[str, ...]:
     return tuple(found)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("rule_id", rules_at_two_places())
 def test_the_effect_is_that_of_a_file_in_which_only_this_place_has_the_cause(rule_id: str) -> None:
     rule, case = find_rule(rule_id), twin(trap_case(rule_id))

@@ -47,12 +47,14 @@ def test_a_clean_robot_is_not_blamed(robot: str, base: Base) -> None:
     assert complaint_about_clean(robot, base) is None
 
 
+@pytest.mark.long_cases
 @needs_all_engines
 @pytest.mark.parametrize("trial", list(single_trials(RULES, 1, among=QUICK)), ids=str)
 def test_a_defect_alone_is_named_at_its_place(trial: Trial) -> None:
     assert judge(trial).complaints == ()
 
 
+@pytest.mark.long_cases
 @needs_all_engines
 @pytest.mark.parametrize("trial", list(pair_trials(RULES, 1, among=QUICK)), ids=str)
 def test_two_defects_are_named_at_their_places(trial: Trial) -> None:

@@ -34,6 +34,7 @@ def check_results(
         )
 
 
+@pytest.mark.long_cases
 @each_engine
 @each_base
 @pytest.mark.parametrize("mimic", [False, True])

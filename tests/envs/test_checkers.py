@@ -61,6 +61,7 @@ def test_checkers_warn_of_nothing(name: str, engine: str, check: Callable[..., N
         check(env, skip_render_check=True)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("check", CHECKERS)
 @pytest.mark.parametrize(("name", "options"), VARIANTS)
 def test_options_pass_the_checkers(name: str, options: dict[str, Any], check: Callable[..., None]) -> None:

@@ -137,6 +137,7 @@ class Beside:
         return observation, reward, terminated, truncated
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("mode", AutoresetMode, ids=str)
 @pytest.mark.parametrize(
     ("task", "drawn"),

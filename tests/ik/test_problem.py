@@ -51,6 +51,7 @@ def test_a_batch_has_the_results_that_its_samples_have_alone(backend: str) -> No
             assert found.position_error[k] == alone.position_error == float(k == 2)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("robot", "frame"),
     [

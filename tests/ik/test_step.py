@@ -105,6 +105,7 @@ def test_opposite_directions_are_turned_by_pi() -> None:
         assert np.linalg.norm(np.array(found.vector, dtype=float)) == pytest.approx(np.pi)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("options", REQUIREMENTS, ids=str)
 def test_targets_are_reached_as_another_engine_confirms(options: dict[str, Any]) -> None:
     rng = np.random.default_rng(3)

@@ -156,6 +156,7 @@ def test_a_blocked_search_of_one_frame_or_several_ends_in_time(
             assert set(found.by_frame) == set(T)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("name", ["pinocchio", "compiled"])
 @pytest.mark.parametrize("pairs", [1, 4, 30, 200])
 @pytest.mark.parametrize("call", ["inverse_kinematics", "track"])

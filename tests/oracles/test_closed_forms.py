@@ -37,6 +37,7 @@ def engine_of(form: ClosedForm, name: str) -> Backend:
     return backend(name, model)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("name", installed_backends())
 @pytest.mark.parametrize("form", FORMS, ids=lambda form: form.robot)
 def test_backend_matches_closed_form(form: ClosedForm, name: str) -> None:

@@ -133,6 +133,7 @@ def test_derived_results_equal_native_ones(base: Base, data: st.DataObject) -> N
                     assert_agreement(compare(quantity, native, derived, sizes))
 
 
+@pytest.mark.long_cases
 @each_base
 @pytest.mark.parametrize("robot", REAL)
 def test_real_robots(robot: str, base: Base) -> None:
@@ -141,6 +142,7 @@ def test_real_robots(robot: str, base: Base) -> None:
         assert_agree(engines, draw_samples(model, 8, seed=0))
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(("robot", "base"), REAL_COMPILED)
 def test_compiled_real_robots(robot: str, base: Base) -> None:
     model = load(robot, base=base)

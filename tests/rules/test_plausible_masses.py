@@ -135,6 +135,7 @@ def test_concentric_joints_have_the_size_of_the_robot() -> None:
     assert found("DX519", case_of(*parts, *(joint(*each) for each in ends))) == []
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("name", REAL)
 def test_real_robots_are_plausible(name: str) -> None:
     path = find(name)

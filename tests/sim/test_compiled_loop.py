@@ -134,6 +134,7 @@ def law_of(name: str, model: Model, options: dict[str, Any]) -> Controller[Any]:
     return LAWS[name](model, options.get("control_dt", 1e-3))
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(("law", "option"), PAIRS)
 def test_the_record_is_that_of_the_plain_loop(law: str, option: str) -> None:
     options = OPTIONS[option]
@@ -218,6 +219,7 @@ def test_compensated_friction_goes_the_plain_way(speed: str) -> None:
     both(ARM, law, np.zeros(6), q0=np.full(6, 0.1), duration=0.02, glued=False)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("plant", ["pinocchio", "reference", "compiled"])
 @pytest.mark.parametrize("options", [{}, {"substeps": 3}, {"control_dt": 3e-3, "delay": 2e-3}])
 def test_a_floating_base(plant: str, options: dict[str, Any]) -> None:

@@ -16,6 +16,7 @@ SAMPLE = ("allegro_right_hand", "bolt", "talos", "ur5_gripper")
 """A hand, a robot with rotors without mass, a humanoid, and an arm with mimic joints."""
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("name", SAMPLE)
 def test_joint_wrenches_are_what_the_engines_measure(name: str, base: Base) -> None:

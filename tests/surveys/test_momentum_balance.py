@@ -12,6 +12,7 @@ for package in ("mujoco", "pydrake", "pybullet", "pinocchio"):
     pytest.importorskip(package)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("engine", BARS)
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("name", ["a1", "panda"])

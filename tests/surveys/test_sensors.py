@@ -34,6 +34,7 @@ def check(worst: Worst, part: str) -> None:
         assert figure <= BARS[part] or what == DIFFERENT, (what, figure, where)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("name", SAMPLE)
 def test_readings_are_those_of_mujocos_sensors_in_every_engines_motion(name: str, base: Base) -> None:
@@ -74,6 +75,7 @@ def test_a_step_on_every_link_is_found_after_5_time_constants(name: str, base: B
     check(worst, "observer")
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("name", SAMPLE)
 def test_nothing_is_left_of_the_weight_of_a_tool(name: str, base: Base) -> None:

@@ -86,6 +86,7 @@ def test_thirty_tasks_and_an_answer_to_each() -> None:
     assert list(task_modules()) == list(range(1, 31)) == list(ANSWERS)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("number", ANSWERS)
 def test_answers(number: int, tmp_path: Path) -> None:
     """An empty folder is refused, the answer by hand accepted, and each wrong answer refused."""

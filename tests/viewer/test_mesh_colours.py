@@ -44,6 +44,7 @@ def subject_of(name: str) -> Any:
     return SUBJECTS[name]()
 
 
+@pytest.mark.long_cases
 @needs_examples
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", SUBJECTS)

@@ -143,6 +143,7 @@ def test_no_other_module_starts_processes() -> None:
     }
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("number", KILLING)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_no_process_outlives_a_killed_command(name: str, number: signal.Signals, tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ pytest.importorskip("pybullet")
 # -- the same results ------------------------------------------------------------------------------
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize(
     "name", ["romeo_laas_small", "allegro_right_hand", "hyq", "icub", "pr2", "quadrotor_base", "iris_simple"]

@@ -68,6 +68,7 @@ def test_all_solutions_of_random_arms(family: str, seed: int, deviation: float) 
         assert (distance[~np.eye(len(q_i), dtype=bool)] > FOUND / 100.0).all()
 
 
+@pytest.mark.long_cases
 @each_family
 def test_a_search_from_many_starts_finds_no_other_solution(family: str) -> None:
     rng = np.random.default_rng(7)
@@ -112,6 +113,7 @@ def test_far_poses_have_no_solution(family: str) -> None:
     assert len(closed_form(model, "tool").solve(T[0]).q) == 0
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("family", FAMILIES)
 def test_poses_near_the_edge_of_the_workspace_have_no_wrong_solution(family: str) -> None:
     """Along a line out of the workspace the solutions are right to its very edge, found by bisection."""

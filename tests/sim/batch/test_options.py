@@ -75,6 +75,7 @@ def held(arm: Model, **options: Any) -> BatchRollouts:
     return batch_and_one(arm, law, POSTURE, q0=POSTURE + 0.05, duration=0.05, **options)[0]
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("option", OPTIONS)
 def test_an_option_means_what_it_means_to_one_rollout(arm: Model, option: str) -> None:
     found = held(arm, **OPTIONS[option])
@@ -102,6 +103,7 @@ def test_pushes_need_no_second_kernel_for_a_large_robot(
     assert True not in kernels
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("through", [True, False])
 def test_mimic_joints_feel_what_they_feel_alone(base: str, through: bool) -> None:

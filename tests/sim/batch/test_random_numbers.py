@@ -65,6 +65,7 @@ def torques(controller: Controller[Any], **options: Any) -> tuple[str, Floats]:
     return found.executor, found.tau
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("kind", [Explorer, Impure])
 @pytest.mark.parametrize(
     "noise", [None, Noise(seed=3, rollout=5), Noise(1e-4, 1e-3, seed=3, rollout=2**53 + 1)]

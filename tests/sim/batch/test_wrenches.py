@@ -23,6 +23,7 @@ PUSHES = (
 )
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize(
     "options",

@@ -49,6 +49,7 @@ def pulled(force: float, plant: str = "compiled", **options: Any) -> Rollout:
     return simulate(robot, law, plant=plant, joint_friction=F, **{**control_dt, **options})
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("start", [0.0, 4.0])
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("plant", [name for name in PLANTS if name != "pybullet"])
@@ -204,6 +205,7 @@ RUBBING = {
 """Robots, each with the step [s] of its case."""
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("name", sorted({each.name for each in robots()} & RUBBING.keys()))
 def test_nothing_oscillates_from_step_to_step(name: str) -> None:
     """A sample of the cases of `benchmarks.surveys.friction_scan`, which searches all robots."""
