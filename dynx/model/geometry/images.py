@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -81,16 +82,34 @@ def read_texture(content: bytes, wraps: tuple[bool, bool] = (True, True)) -> Tex
     Raises ValueError for a file that is damaged, too large or of another format, NotInstalledError without
     Pillow.
     """
+    return Texture(_read(content, _FORMATS, lambda image: np.array(image.convert("RGB"))), wraps)
+
+
+def read_levels(content: bytes) -> NDArray[np.uint8]:
+    """Return the levels (rows, columns), from 0 to 255, of a PNG file of greys: of one with colours the red,
+    of one with 16 bits the upper 8, as MuJoCo reads heights. Raises the errors of `read_texture`."""
+
+    def levels(image: Any) -> NDArray[np.uint8]:
+        if image.mode.startswith("I"):
+            return np.asarray(np.array(image).astype(np.uint32) >> 8, dtype=np.uint8)
+        return np.array(image.convert("RGB"))[:, :, 0]
+
+    return _read(content, ("PNG",), levels)
+
+
+def _read(
+    content: bytes, formats: tuple[str, ...], pixels: Callable[[Any], NDArray[np.uint8]]
+) -> NDArray[np.uint8]:
     library = _pillow()
     try:
-        image = library.open(io.BytesIO(content), formats=_FORMATS)
+        image = library.open(io.BytesIO(content), formats=formats)
         if image.width * image.height > MAX_PIXELS:
             raise ValueError(f"it has {image.width} x {image.height} pixels; at most {MAX_PIXELS} are read")
-        return Texture(np.array(image.convert("RGB")), wraps)
+        return pixels(image)
     except ValueError:
         raise
     except library.UnidentifiedImageError:
-        raise ValueError(f"it cannot be read: it is none of {', '.join(_FORMATS)}") from None
+        raise ValueError(f"it cannot be read: it is none of {', '.join(formats)}") from None
     # Pillow raises whatever exception damaged data lead to.
     except Exception as error:
         raise ValueError(f"it cannot be read: {shown(str(error) or type(error).__name__, 200)}") from None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynx.errors import ArgumentError, DescriptionError, nearest, shown
+from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, nearest, shown
 from dynx.files.reading import read_file
 from dynx.model.elements import Pose, Vector
 from dynx.model.geometry import (
@@ -25,6 +25,7 @@ from dynx.model.geometry import (
     Sphere,
     Visual,
 )
+from dynx.model.geometry.images import read_levels
 from dynx.model.geometry.mesh_inertia import mesh_properties
 from dynx.model.geometry.shapes import MAX_HEIGHTS
 from dynx.model.geometry.shells import shell_properties
@@ -385,11 +386,11 @@ class GeomReader:
     def _heights_of_file(self, element: Element, what: str) -> Floats:
         """Return the heights (rows, columns) of a file in MuJoCo's own format: two counts, and floats."""
         filename = element.attributes["file"]
-        if filename.lower().endswith(".png"):
-            raise self._reading.unsupported(element, f"{what} is an image, which dynx does not read")
         path, reason = self._document.find(element, self._document.compiler_of(element).mesh_folder, filename)
         if reason:
             raise self._reading.error(element, f"{what} is not read: {reason}")
+        if filename.lower().endswith(".png"):
+            return self._heights_of_image(element, path, what)
         data = read_file(path)
         rows, columns = np.frombuffer(data[:8], "<i4").tolist() if len(data) >= 8 else (0, 0)
         if min(rows, columns) < 2 or len(data) != 8 + 4 * rows * columns:
@@ -400,6 +401,15 @@ class GeomReader:
         if not np.isfinite(heights).all():
             raise self._reading.error(element, f"the file {shown(filename)} of {what} has heights of NaN")
         return heights
+
+    def _heights_of_image(self, element: Element, path: str, what: str) -> Floats:
+        """Return the heights (rows, columns) of an image, whose upper row is that of the largest y."""
+        try:
+            return np.array(read_levels(read_file(path))[::-1], dtype=np.float64)
+        except NotInstalledError as error:
+            raise self._reading.unsupported(element, f"{what} is an image: {error}") from None
+        except ValueError as error:
+            raise self._reading.error(element, f"the image of {what}: {error}") from None
 
     def _appearance(self, geom: Geom) -> Appearance | None:
         """Return the colour of a geom: its own, else that of its material, else that of its mesh's."""

@@ -207,6 +207,31 @@ def test_height_fields_of_the_world() -> None:
     require_close(placed.shape.heights, 3.0 * data, 1e-6)
 
 
+@pytest.mark.parametrize("mode", ["L", "RGB", "RGBA", "LA", "P", "1", "I;16"])
+def test_height_fields_of_images_have_the_heights_of_mujoco(tmp_path: Path, mode: str) -> None:
+    images = pytest.importorskip("PIL.Image")
+    rng = np.random.default_rng(0)
+    if mode == "I;16":
+        image = images.fromarray(rng.integers(0, 2**16, (3, 4), dtype=np.uint16))
+    else:
+        image = images.fromarray(rng.integers(0, 256, (3, 4, 3), dtype=np.uint8)).convert(mode)
+    image.save(tmp_path / "hills.png")
+    asset = '<asset><hfield file="hills.png" size="1 2 3 0.5"/></asset>'
+    geom = '<geom name="hill" type="hfield" hfield="hills"/></worldbody>'
+    path = tmp_path / "scene.xml"
+    path.write_text(TWO.replace("<worldbody>", f"{asset}<worldbody>").replace("</worldbody>", geom))
+    (placed,) = read_scene(path).body("hill").shapes
+    assert isinstance(placed.shape, HeightField)
+    data = mujoco.MjModel.from_xml_path(str(path)).hfield_data.reshape(3, 4)
+    require_close(placed.shape.heights, 3.0 * data, 1e-6)
+    (tmp_path / "hills.png").write_bytes(b"no image")
+    with pytest.raises(
+        DescriptionError, match="the image of height field 'hills': it cannot be read"
+    ) as caught:
+        read_scene(path)
+    assert caught.value.line is not None
+
+
 # -- contacts ---------------------------------------------------------------------------------------
 
 
