@@ -130,7 +130,7 @@ def _asset_files(model: Model) -> list[str]:
     links = model.geometry.links.values()
     shapes = [each.shape for link in links for each in link.visuals]
     shapes += [each.shape for link in links for each in link.collisions]
-    return [shape.file for shape in shapes if isinstance(shape, Mesh)]
+    return [shape.file for shape in shapes if isinstance(shape, Mesh) and shape.file]
 
 
 def _keep_json_apart(json_path: str | None, out: str | None, found: Conversion, model: Model) -> None:

@@ -318,7 +318,7 @@ def shape_differences(model: Model, back: Model) -> Iterator[str]:
 
 def _shape_difference(mine: Visual | Collision, theirs: Visual | Collision) -> str:
     a, b = mine.shape, theirs.shape
-    if type(a) is not type(b):
+    if type(a) is not type(b) and not (isinstance(a, Mesh) and isinstance(b, Mesh)):
         return "kind"
     if not _same_pose(mine.origin, theirs.origin, 1.0 + max(map(abs, mine.origin.xyz))):
         return "pose"
@@ -351,7 +351,7 @@ def _same_mesh(a: Mesh, b: Mesh) -> bool:
         # There is nothing to compare but the names of files that are not read.
         return a.fault is not None and b.fault is not None and a.file == b.file
     try:
-        if read_file(a.file) == read_file(b.file) and a.part is b.part:
+        if a.file and b.file and read_file(a.file) == read_file(b.file) and a.part is b.part:
             return True
         triangles: list[Floats] = [each.triangles[0][each.triangles[1]] for each in (a, b)]
     except DescriptionError:

@@ -191,7 +191,7 @@ def _words(placed: Visual | Collision) -> str:
     shape = placed.shape
     if isinstance(shape, Mesh):
         scale = "" if shape.scale == (1.0, 1.0, 1.0) else f" scaled by {vector_text(shape.scale, DIGITS)}"
-        return f"mesh {PurePath(shape.file).name}{scale}"
+        return f"mesh {PurePath(shape.name).name}{scale}"
     sizes = ", ".join(
         f"{name} {vector_text(value, DIGITS) if isinstance(value, tuple) else format(value, f'.{DIGITS}g')}"
         for name, value in vars(shape).items()

@@ -35,7 +35,7 @@ class AssetFiles:
         self._folder, self._formats = folder, tuple(formats)
         self.files: dict[str, bytes] = {}
         """Contents by path, with / between folders."""
-        self._places: dict[tuple[str, int | None], str] = {}
+        self._places: dict[tuple[str, int | None] | Mesh, str] = {}
         self._taken: set[str] = set()
         self._common = _common_folder(_sources(geometry))
 
@@ -44,7 +44,9 @@ class AssetFiles:
 
         Raises DescriptionError for one that cannot be read.
         """
-        key = (mesh.file, mesh.part)
+        key = (mesh.file, mesh.part) if mesh.file else replace(mesh, scale=(1.0, 1.0, 1.0))
+        if key not in self._places and not mesh.file:
+            self._places[key] = self._write_obj(mesh)
         if key not in self._places:
             content = read_file(mesh.file)
             suffix = PurePath(mesh.file).suffix.lower()
@@ -71,7 +73,8 @@ class AssetFiles:
         return PurePath(self._folder, *PurePath(inside).parts).as_posix()
 
     def _write_obj(self, mesh: Mesh) -> str:
-        place = PurePath(self._place(os.path.realpath(mesh.file)))
+        source = os.path.realpath(mesh.file) if mesh.file else os.path.join(self._common, f"{mesh.name}.obj")
+        place = PurePath(self._place(source))
         part = "" if mesh.part is None else f"_part{mesh.part}"
         stem, number = f"{place.stem}{part}", 2
         while place.with_name(f"{stem}.obj").as_posix() in {*self.files, *self._taken}:
@@ -172,7 +175,7 @@ def _sources(geometry: Geometry) -> Iterator[str]:
     for link in geometry.links.values():
         shapes = [*(each.shape for each in link.visuals), *(each.shape for each in link.collisions)]
         for shape in shapes:
-            if isinstance(shape, Mesh) and shape.fault is None:
+            if isinstance(shape, Mesh) and shape.file and shape.fault is None:
                 yield shape.file
                 with suppress(DescriptionError):
                     yield from _companions(shape.file)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,7 @@ def convex_decomposition(
         raise ArgumentError(f"concavity is {concavity}; wanted above 0 and at most 1")
     if mesh.fault is not None:
         raise mesh.fault
-    vertices, faces = read_triangles(mesh.file)
+    vertices, faces = replace(mesh, scale=(1.0, 1.0, 1.0)).triangles
     coacd = _coacd()
     coacd.set_log_level("error")
     parts = coacd.run_coacd(coacd.Mesh(vertices, faces.astype(np.int32)), threshold=concavity, seed=0)

@@ -62,11 +62,13 @@ class _HullMesh(Mesh):
     """The convex hull of a mesh, which has one colour."""
 
     parts = ()
+    mesh: Mesh | None = None
 
     @cached_property
     def triangles(self) -> tuple[Floats, Faces]:
         """Vertices (n, 3) [m] and triangles (m, 3) of the hull."""
-        return Mesh(self.file, self.scale, self.fault, self.part).hull
+        assert self.mesh is not None
+        return self.mesh.hull
 
     @cached_property
     def surface(self) -> Surface:
@@ -94,7 +96,7 @@ def _collided(shape: Shape) -> Shape:
     """Return a shape as engines collide it; raises DescriptionError for a mesh that cannot be read."""
     if not isinstance(shape, Mesh):
         return shape
-    hull = _HullMesh(shape.file, shape.scale, shape.fault, shape.part)
+    hull = _HullMesh(shape.file or shape.name, shape.scale, shape.fault, shape.part, shape)
     _ = hull.triangles
     return hull
 

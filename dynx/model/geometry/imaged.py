@@ -33,7 +33,9 @@ class ImagedShape(Mesh):
         """The triangles with the image on them."""
         texture = read_texture(read_file(self.file))
         if isinstance(self.shape, Mesh):
-            found = mesh_file(self.shape.file).textured_surface(texture, np.array(self.shape.scale))
+            found = None
+            if self.shape.file:
+                found = mesh_file(self.shape.file).textured_surface(texture, np.array(self.shape.scale))
             if found is None:
                 raise ValueError(f"{self.shape.name} has no places in an image")
             return found

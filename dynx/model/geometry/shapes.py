@@ -70,10 +70,9 @@ class Ellipsoid:
 
     def triangles(self) -> tuple[np.ndarray, np.ndarray]:
         """Return a polyhedron near the surface: vertices (n, 3) [m] and outward triangles (m, 3)."""
-        from dynx.model.geometry.triangulation import near_unit_ball
+        from dynx.model.geometry.triangulation import ellipsoid_triangles
 
-        vertices, faces = near_unit_ball()
-        return vertices * np.array(self.radii), faces
+        return ellipsoid_triangles(np.array(self.radii))
 
 
 @dataclass(frozen=True)

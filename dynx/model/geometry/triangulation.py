@@ -25,8 +25,14 @@ def grid_triangles(heights: Floats, size: tuple[float, float]) -> tuple[np.ndarr
     return vertices, faces
 
 
+def ellipsoid_triangles(radii: Floats) -> tuple[np.ndarray, np.ndarray]:
+    """Return a convex polyhedron near an ellipsoid with these half axes (3,) (`Ellipsoid.triangles`)."""
+    vertices, faces = _near_unit_ball()
+    return vertices * radii, faces
+
+
 @lru_cache(maxsize=1)
-def near_unit_ball() -> tuple[np.ndarray, np.ndarray]:
+def _near_unit_ball() -> tuple[np.ndarray, np.ndarray]:
     """Return a geodesic polyhedron whose vertices are as far outside the unit ball as its faces are inside:
     an octahedron whose triangles are divided into four, four times."""
     vertices = np.concatenate([np.eye(3), -np.eye(3)])

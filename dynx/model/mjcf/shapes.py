@@ -30,6 +30,7 @@ from dynx.model.geometry.mesh_inertia import mesh_properties
 from dynx.model.geometry.shapes import MAX_HEIGHTS
 from dynx.model.geometry.shells import shell_properties
 from dynx.model.geometry.solids import Shape, SolidProperties, solid_properties
+from dynx.model.geometry.stated_mesh import StatedMesh
 from dynx.model.mjcf.document import MjcfText, stem
 from dynx.model.xml.reading import Element
 from dynx.spatial.scalar import Floats
@@ -475,13 +476,52 @@ class GeomReader:
                 element,
                 f"{what} has refquat and a scale that differs along the axes, which dynx does not read",
             )
+        if "vertex" in given and "file" not in given:
+            # What `Mesh` cannot say of a file is done to the vertices.
+            mesh = self._stated_mesh(element, what, scale, (shift, R) if fault is not None else None)
+            placement = np.eye(4) if fault is not None else placement
+            return MeshAsset(mesh, placement, inertia, element, given.get("material"))
         path = what
         if "file" not in given:
-            why = "made by the compiler" if "builtin" in given else "given by its vertices"
-            fault = reading.unsupported(element, f"{what} is {why}; dynx reads meshes from files")
+            why = "made by the compiler" if "builtin" in given else "has no file and no vertices"
+            fault = reading.unsupported(element, f"{what} {'is ' if 'builtin' in given else ''}{why}")
         else:
             path, reason = self._document.find(
                 element, self._document.compiler_of(element).mesh_folder, given["file"]
             )
             fault = reading.error(element, f"{what} is not read: {reason}") if reason else fault
         return MeshAsset(Mesh(path, scale, fault), placement, inertia, element, given.get("material"))
+
+    def _stated_mesh(
+        self, element: Element, what: str, scale: Vector, moved: tuple[Floats, Floats] | None
+    ) -> StatedMesh:
+        """Return a mesh that ``vertex`` and ``face`` state; without faces it is the hull of its vertices.
+
+        They are first `moved` back by a shift (3,), and turned back by a rotation (3, 3).
+        """
+        reading, given = self._reading, element.attributes
+        counts = {name: len(given.get(name, "").split()) for name in ("vertex", "face")}
+        for name, count in counts.items():
+            if count % 3 or (name == "vertex" and count < 12):
+                least = "; wanted those of at least four" if name == "vertex" else ""
+                raise reading.error(
+                    element, f"{name} of {what} has {count} numbers; wanted three of each{least}"
+                )
+        points = np.array(reading.numbers(element, "vertex", what, counts["vertex"])).reshape(-1, 3)
+        if moved is not None:
+            points = (points - moved[0]) @ moved[1]
+        corners = np.empty((0, 3))
+        if counts["face"]:
+            corners = np.array(reading.numbers(element, "face", what, counts["face"])).reshape(-1, 3)
+        label = given.get("name") or "mesh"
+        if not (corners == np.rint(corners)).all():
+            raise reading.error(element, f"face of {what} has a number that is not whole")
+        try:
+            return StatedMesh(
+                scale=scale,
+                points=tuple((x, y, z) for x, y, z in points.tolist()),
+                corners=tuple((a, b, c) for a, b, c in corners.astype(np.intp).tolist()),
+                label=label,
+            )
+        except ArgumentError as error:
+            raise reading.error(element, f"{what}: {error}") from None

@@ -23,6 +23,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, UnsupportedFeatureError, shown
 from dynx.model.elements import IDENTITY, Inertial, Joint, Limits, Link, Pose
 from dynx.model.geometry import Appearance, Collision, HeightField, LinkGeometry, Mesh, Plane, Visual
+from dynx.model.geometry.stated_mesh import StatedMesh
 from dynx.model.mjcf.attributes import (
     MAX_DEPTH,
     UNLIMITED,
@@ -328,6 +329,8 @@ class _Assets:
         except DescriptionError as error:
             self._notes.append(f"{what} is left out: {error}.")
             return None
+        if not path:
+            return self._add_stated(mesh)
         fault = name_fault(path)
         if fault is not None:
             self._notes.append(f"{what} is left out: the path of its mesh {fault}.")
@@ -341,6 +344,18 @@ class _Assets:
         if mesh.scale != (1.0, 1.0, 1.0):
             given["scale"] = text(mesh.scale)
         # The moments of a shell need no volume, so that a flat mesh is accepted too.
+        SubElement(self._section, "mesh", given | {"inertia": "shell"})
+        return name
+
+    def _add_stated(self, mesh: Mesh) -> str:
+        """Add a mesh that the description states by its vertices."""
+        assert isinstance(mesh, StatedMesh)
+        name = self._new_name(mesh.label)
+        given = {"name": name, "vertex": text(np.array(mesh.points).ravel())}
+        if mesh.corners:
+            given["face"] = " ".join(str(number) for corners in mesh.corners for number in corners)
+        if mesh.scale != (1.0, 1.0, 1.0):
+            given["scale"] = text(mesh.scale)
         SubElement(self._section, "mesh", given | {"inertia": "shell"})
         return name
 

@@ -299,6 +299,9 @@ class SdfWriter:
             except DescriptionError as error:
                 self.notes.append(f"{what} is left out: {error}.")
                 return None
+        if not path:
+            _add(self._kinds, "Meshes without a file are left out; dynx convert writes them", link.name)
+            return None
         fault = name_fault(path)
         if fault is not None:
             self.notes.append(f"{what} is left out: the path of its mesh {fault}.")

@@ -46,10 +46,7 @@ def urdf_geometry(
 
 
 def read_link_shapes(
-    data: str | bytes,
-    source: str,
-    package_dirs: tuple[str, ...] = (),
-    frames: frozenset[str] = frozenset(),
+    data: str | bytes, source: str, package_dirs: tuple[str, ...] = (), frames: frozenset[str] = frozenset()
 ) -> dict[str, LinkGeometry]:
     """Read the shapes of each link, but for `frames`, of a URDF document that `read_urdf` accepts."""
     notes: list[Note] = []
@@ -107,9 +104,8 @@ class _ShapeReader:
 
     def _visual(self, element: Element, what: str) -> Visual:
         shape, origin = self._shape(element, what), read_origin(element, what, self._reading)
-        return Visual(
-            shape, origin, self._material(element), element.attributes.get("name", ""), element.line
-        )
+        name = element.attributes.get("name", "")
+        return Visual(shape, origin, self._material(element), name, element.line)
 
     def _collision(self, element: Element, what: str) -> Collision:
         shape, origin = self._shape(element, what), read_origin(element, what, self._reading)
@@ -134,6 +130,10 @@ class _ShapeReader:
             return Ellipsoid(reading.vector(shape, "radii", what))
         if shape.tag == "mesh":
             return self._mesh(shape, what)
+        if shape.tag == "dynx_mesh":
+            from dynx.model.urdf.stated_meshes import read_stated_mesh
+
+            return read_stated_mesh(shape, what, reading)
         if shape.tag == "plane":
             return self._plane(shape, what)
         raise reading.unsupported(

@@ -93,6 +93,12 @@ def _shape(shape: Shape, link: str, mesh_path: MeshPath) -> str:
     if isinstance(shape, Mesh):
         # A mesh that was not found keeps the name that it has in the description, and is not found again.
         path = shape.file if shape.fault is not None else mesh_path(shape)
+        if not path:  # Of a mesh that the description states.
+            from dynx.model.geometry.stated_mesh import StatedMesh
+            from dynx.model.urdf.stated_meshes import stated_mesh_element
+
+            assert isinstance(shape, StatedMesh)
+            return stated_mesh_element(shape)
         return f'<mesh filename={quoteattr(path)} scale="{_finite_numbers(shape.scale)}"/>'
     raise DescriptionError(f"URDF cannot express the {type(shape).__name__} of link {shown(link)}")
 

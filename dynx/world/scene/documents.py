@@ -90,7 +90,9 @@ class ShapeDocument:
 
     `box` has three edge lengths, `cylinder` and `capsule` radius and length, `ellipsoid` three half axes,
     `mesh` a file beside the scene, scaled by `scale`, `heights` the rows of a height field of the extent
-    `size` along x and y. `rgba` is the colour of a visual; without it a visual has that of its body.
+    `size` along x and y. `vertices` are those of a mesh without a file; each of `faces` has the numbers of
+    three of them, from 0, and without faces it is their hull. `rgba` is the colour of a visual; without it a
+    visual has that of its body.
     """
 
     box: Vector | None = None
@@ -101,6 +103,8 @@ class ShapeDocument:
     plane: Literal[True] | None = None
     mesh: str | None = None
     heights: list[Vector] | None = None
+    vertices: list[Vector] | None = None
+    faces: list[list[int]] | None = None
     scale: Vector | None = None
     size: Vector | None = None
     pose: Vector | None = None
@@ -416,14 +420,18 @@ def _visual(given: ShapeDocument, paths: ScenePaths) -> Visual:
 def _shape(given: ShapeDocument, paths: ScenePaths) -> Collision:
     if given.rgba is not None:
         raise ArgumentError("rgba belongs to visuals; the colour of shapes is that of the material")
-    kinds = ("box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "heights")
+    kinds = ("box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "heights", "vertices")
     present = [name for name in kinds if getattr(given, name) is not None]
     if len(present) != 1:
         found = f"it has {' and '.join(present)}" if present else "it has none"
         raise ArgumentError(f"a shape has one of {', '.join(kinds)}; {found}")
-    for name, owner in (("scale", "mesh"), ("size", "heights")):
-        if getattr(given, name) is not None and present != [owner]:
-            raise ArgumentError(f"{name} belongs to {owner}, not to {present[0]}")
+    for name, owners in (
+        ("scale", ("mesh", "vertices")),
+        ("size", ("heights",)),
+        ("faces", ("vertices",)),
+    ):
+        if getattr(given, name) is not None and present[0] not in owners:
+            raise ArgumentError(f"{name} belongs to {' and '.join(owners)}, not to {present[0]}")
     return Collision(_solid(given, paths), _pose("pose of a shape", given.pose) or IDENTITY)
 
 
@@ -445,8 +453,16 @@ def _solid(given: ShapeDocument, paths: ScenePaths) -> Shape:
             raise ArgumentError("heights has no size; wanted the extent of the grid along x and y")
         x, y = finite_numbers("size of a height field", given.size, 2)
         return HeightField(tuple(map(tuple, given.heights)), (x, y))
+    scale = (1.0, 1.0, 1.0) if given.scale is None else finite_vector("scale of a mesh", given.scale)
+    if given.vertices is not None:
+        points = tuple(finite_vector("a vertex of a mesh", each) for each in given.vertices)
+        if any(len(each) != 3 for each in given.faces or ()):
+            raise ArgumentError("a face of a mesh has not three vertices")
+        corners = tuple((a, b, c) for a, b, c in given.faces or ())
+        from dynx.model.geometry.stated_mesh import StatedMesh
+
+        return StatedMesh(scale=scale, points=points, corners=corners)
     if given.mesh is not None:
-        scale = (1.0, 1.0, 1.0) if given.scale is None else finite_vector("scale of a mesh", given.scale)
         return Mesh(paths.find(given.mesh, "mesh"), scale)
     return Plane()
 
@@ -551,7 +567,7 @@ def _mesh_folders(model: Model) -> list[str]:
     placed: list[Visual | Collision] = []
     for link in model.geometry.links.values():
         placed += [*link.visuals, *link.collisions]
-    meshes = [each.shape for each in placed if isinstance(each.shape, Mesh)]
+    meshes = [each.shape for each in placed if isinstance(each.shape, Mesh) and each.shape.file]
     return sorted({os.path.dirname(mesh.file) for mesh in meshes if mesh.fault is None})
 
 
@@ -625,6 +641,16 @@ def _shape_document(placed: Collision, paths: ScenePaths) -> ShapeDocument:
     if isinstance(shape, HeightField):
         heights = [list(row) for row in shape.heights]
         return ShapeDocument(heights=heights, size=list(shape.size), pose=pose)
+    if isinstance(shape, Mesh) and not shape.file:
+        from dynx.model.geometry.stated_mesh import StatedMesh
+
+        assert isinstance(shape, StatedMesh)
+        return ShapeDocument(
+            vertices=[list(each) for each in shape.points],
+            faces=[list(each) for each in shape.corners] or None,
+            scale=list(shape.scale),
+            pose=pose,
+        )
     if isinstance(shape, Mesh):
         return ShapeDocument(mesh=paths.write(shape.file), scale=list(shape.scale), pose=pose)
     assert isinstance(shape, Plane)

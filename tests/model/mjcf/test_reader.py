@@ -176,6 +176,52 @@ def test_primitives_fitted_to_meshes(tmp_path: Path, shape: str, flag: str, kind
         np.testing.assert_allclose(got, wanted, rtol=1e-6)
 
 
+CORNERS = "0 0 0 0.4 0 0 0 0.3 0 0.1 0.1 0.5 0.4 0.4 0.1"
+"""Vertices of a mesh; all of them are on their hull."""
+
+
+@pytest.mark.parametrize("faces", ["", ' face="0 2 1 0 1 3 0 3 2 1 2 4 1 4 3 2 3 4"'])
+@pytest.mark.parametrize("kind", ["convex", "exact", "legacy", "shell"])
+@pytest.mark.parametrize("turned", ['refpos="0.1 0 0"', 'refpos="0.1 0 0" refquat="1 0.5 0.2 0.1"'])
+def test_meshes_by_their_vertices_are_those_of_mujoco(turned: str, faces: str, kind: str) -> None:
+    mesh = f'<mesh name="m" vertex="{CORNERS}"{faces} inertia="{kind}" scale="1 2 0.5" {turned}/>'
+    geom = '<geom type="mesh" mesh="m" pos="0.1 0.2 0.3" euler="0.1 0.2 0.3"/>'
+    text = ARM.replace('<geom size="0.1"/>', geom).replace("<worldbody>", f"<asset>{mesh}</asset><worldbody>")
+    compiled, model = mujoco.MjModel.from_xml_string(text), dynx.load(text)
+    want = compute(mujoco, compiled, 0, free=False)
+    engine = dynx.backend("reference", model)
+    require_close(engine.inverse_dynamics(want.q, want.v, want.a), want.torques, 1e-6)
+    require_close(engine.mass_matrix(want.q), want.mass_matrix, 1e-6)
+    (placed,) = model.geometry.collisions("link")
+    assert isinstance(placed.shape, Mesh)
+    vertices = placed.shape.triangles[0] @ placed.origin.matrix[:3, :3].T + placed.origin.xyz
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, compiled.geom_quat[0])
+    theirs = compiled.mesh_vert @ R.reshape(3, 3).T + compiled.geom_pos[0]
+    for end in (np.min, np.max):
+        np.testing.assert_allclose(end(vertices, axis=0), end(theirs, axis=0), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("stated", "named"),
+    [
+        ('vertex="0 0 0 1 0 0"', "vertex of mesh 'm' has 6 numbers"),
+        (f'vertex="{CORNERS} 1"', "vertex of mesh 'm' has 16 numbers"),
+        (f'vertex="{CORNERS}" face="0 1"', "face of mesh 'm' has 2 numbers"),
+        (f'vertex="{CORNERS}" face="0 1 9"', "vertex 9; wanted 0 to 4"),
+        (f'vertex="{CORNERS}" face="0 1 1.5"', "not whole"),
+        ('builtin="sphere" params="1"', "is made by the compiler"),
+        ("", "has no file and no vertices"),
+    ],
+)
+def test_faults_of_meshes_by_their_vertices(stated: str, named: str) -> None:
+    text = ARM.replace('<geom size="0.1"/>', '<geom type="mesh" mesh="m"/>')
+    text = text.replace("<worldbody>", f'<asset>\n<mesh name="m" {stated}/></asset><worldbody>')
+    with pytest.raises(DescriptionError, match=named) as caught:
+        dynx.load(text)
+    assert caught.value.line == 4
+
+
 @pytest.mark.parametrize("stated", ["", ' mass="3"', ' density="70"'])
 def test_the_shell_of_an_ellipsoid_is_that_of_mujoco(stated: str) -> None:
     geom = f'<geom type="ellipsoid" size="0.1 0.3 0.2" shellinertia="true"{stated}/>'
