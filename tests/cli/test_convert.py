@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
 
 import dynx
 from dynx.cli.shell.main import cli
+from dynx.model import Pose
 from dynx.model.conversion import robot_differences
+from dynx.model.urdf.writer import urdf_text
 
 
 def run(*arguments: object) -> Result:
@@ -65,14 +68,19 @@ def test_no_file_is_replaced_unless_it_is_allowed(tmp_path: Path) -> None:
     assert run(out, "-o", out, "--overwrite").exit_code == 2
 
 
-def test_a_robot_that_would_be_another_one_is_not_written(tmp_path: Path) -> None:
-    source, out = tmp_path / "r.urdf", tmp_path / "r.xml"
-    source.write_text('<robot name="r"><link name="world"/></robot>')
-    result = run(source, "-o", out, "--base-pose", "1,0,0")
+def test_a_robot_that_would_be_another_one_is_not_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wrong(model: dynx.Model, **options: Any) -> str:
+        return urdf_text(model.with_base_pose(Pose((1.0, 0.0, 0.0))), **options)
+
+    monkeypatch.setattr("dynx.model.conversion.urdf_text", wrong)
+    out = tmp_path / "r.urdf"
+    result = run("double_pendulum", "-o", out)
     assert result.exit_code == 1
     assert "pose of the base" in result.output
     assert not out.exists()
-    found = json.loads(run(source, "-o", out, "--base-pose", "1,0,0", "--json").stdout)
+    found = json.loads(run("double_pendulum", "-o", out, "--json").stdout)
     assert found["same"] is False
     assert found["differences"]
 
@@ -86,7 +94,6 @@ def test_a_robot_that_would_be_another_one_is_not_written(tmp_path: Path) -> Non
         (["double_pendulum", "--to", "urdf", "-o", "a.xml"], ".urdf"),
         (["double_pendulm", "--to", "urdf"], "double_pendulum"),
         (["double_pendulum", "-o", "no/such/folder/a.xml"], "no/such/folder"),
-        (["ur5", "--base", "floating", "--to", "mjcf"], "world"),
     ],
 )
 def test_wrong_arguments_are_named(arguments: list[str], word: str) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 import dynx
@@ -28,6 +29,7 @@ from dynx.model.geometry import (
     Sphere,
     Visual,
 )
+from dynx.model.urdf.writer import urdf_text
 from dynx.testing.strategies import models
 
 FORMATS: tuple[Format, ...] = ("mjcf", "sdf", "urdf")
@@ -47,7 +49,6 @@ def arm(geometry: LinkGeometry | None = None) -> Model:
 
 @given(models(physical=False))
 def test_random_robots_are_the_same_in_both_formats(model: Model) -> None:
-    assume(model.root != "world")
     for to in FORMATS:
         assert convert(model, to).differences == ()
 
@@ -255,13 +256,30 @@ def test_what_urdf_cannot_say_is_noted() -> None:
     assert "pose of the base" in convert(model.with_base_pose(Pose((1.0, 0.0, 0.0))), "urdf").notes[0]
 
 
-def test_a_document_that_would_be_another_robot_is_not_written(tmp_path: Path) -> None:
-    model = Model.build("r", [Link("world"), Link("b", CUBE)], [Joint("j", "continuous", "world", "b")])
-    found = convert(model.with_base_pose(Pose((1.0, 0.0, 0.0))), "mjcf")
+def test_a_document_that_would_be_another_robot_is_not_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wrong(model: Model, **options: Any) -> str:
+        return urdf_text(model.with_base_pose(Pose((1.0, 0.0, 0.0))), **options)
+
+    monkeypatch.setattr("dynx.model.conversion.urdf_text", wrong)
+    found = convert(arm(), "urdf")
     assert found.differences[0] == "the pose of the base differs"
     with pytest.raises(ArgumentError, match="pose of the base"):
-        found.write(tmp_path / "r.xml")
+        found.write(tmp_path / "r.urdf")
     assert [*tmp_path.iterdir()] == []
+
+
+@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("inertial", [None, CUBE])
+def test_a_root_link_world_may_be_anywhere(to: Format, inertial: Inertial | None) -> None:
+    joints = [Joint("j", "continuous", "world", "b"), Joint("k", "prismatic", "world", "c")]
+    links = [Link("world", inertial), Link("b", CUBE), Link("c", CUBE)]
+    shapes = Geometry({"world": LinkGeometry((), (Collision(Sphere(1.0)),))})
+    model = Model.build("r", links, joints, geometry=shapes).with_frame("tip", "world", Pose((0.0, 0.0, 1.0)))
+    for pose in (Pose(), Pose((1.0, 0.0, 0.0), (0.1, 0.2, 0.3))):
+        found = convert(model.with_base_pose(pose), to)
+        assert (found.differences, found.shape_differences) == ((), ())
 
 
 def test_an_unknown_format_and_an_unspeakable_name_are_refused() -> None:

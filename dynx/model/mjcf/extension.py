@@ -27,8 +27,9 @@ NUMBERS = ("lower", "upper", "velocity", "effort", "locked")
 and of effort [N m or N] where ``actuatorfrcrange`` cannot, its largest speed [rad/s or m/s], the position
 [rad or m] at which it was locked."""
 
-TEXTS = ("root", "fixed")
-"""Kinds of texts: the root link (without a name), and the name of a fixed joint by that of its link."""
+TEXTS = ("root", "name", "fixed")
+"""Kinds of texts: the body of the root link, and the name of that link where the body cannot have it (both
+without a name), and the name of a fixed joint by that of its link."""
 
 
 @dataclass(frozen=True)

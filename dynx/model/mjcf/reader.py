@@ -218,6 +218,7 @@ class _TreeReader:
         self._count = 0
         self._extension = Extension.read(document.sections("custom"), document.reading)
         self._base_pose = IDENTITY
+        self._root_name: str | None = None
         self._mass_apart = 0.0
         # Names that are made up keep clear of those that stand further down.
         self._taken = _names(document.root, "body")
@@ -317,6 +318,7 @@ class _TreeReader:
         free = [entry for entry in world.bodies if self._has_free_joint(entry)]
         if not free and self._is_stated_root(world):
             self._base_pose = Pose.from_matrix(world.bodies[0][1])
+            self._root_name = self._extension.texts["name"].get("")
             self._read_body(world.bodies[0], None)
             return "fixed"
         if not free:
@@ -347,6 +349,8 @@ class _TreeReader:
                 f"the robot moves freely; what is fixed in the world is no part of it: "
                 f"{_counted(left_out, 'element')}",
             )
+        if free[0][0].attributes.get("name") == self._extension.texts["root"].get(""):
+            self._root_name = self._extension.texts["name"].get("")
         self._read_body(free[0], None)
         return "floating"
 
@@ -403,6 +407,8 @@ class _TreeReader:
             if len(self._parts.links) >= MAX_LINKS:
                 raise self._reading.error(body.element, f"the robot has more than {MAX_LINKS} links")
             body.name = self._body_name(body.element)
+            if above is None and self._root_name is not None:
+                body.name = self._root_name
             if above is None and len(body.joints) > 1:
                 raise self._reading.error(
                     body.joints[1][0],

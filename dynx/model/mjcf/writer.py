@@ -40,6 +40,7 @@ from dynx.model.tree import Tree
 from dynx.model.urdf.reader import inertia_fault
 from dynx.model.urdf.writer import listed, note_of_kind
 from dynx.model.xml.reading import MAX_DEPTH as MAX_ELEMENT_DEPTH
+from dynx.model.xml.several_files import free_name
 from dynx.model.xml.values import name_fault
 
 WORLD = "world"
@@ -73,8 +74,7 @@ def write_mjcf(tree: Tree, /) -> str:
     convert`` copies them.
 
     Raises DescriptionError for a name that MJCF cannot express and a limit that is NaN,
-    UnsupportedFeatureError for a link that moves or is free and is named ``world``, and for too many links
-    in a row.
+    UnsupportedFeatureError for a link named ``world`` that is not the root, and for too many links in a row.
     """
     return RobotWriter(tree).text()
 
@@ -154,7 +154,7 @@ class RobotWriter:
                 body = _body(bodies[joint.parent], link.name, joint.origin)
                 self._add_joint(body, joint, link)
             bodies[link.name] = body
-            if link.name != WORLD and link.inertial is not None:
+            if body is not world and link.inertial is not None:
                 SubElement(body, "inertial", _inertial_attributes(link.inertial))
             self._add_shapes(body, link)
             for frame in frames.get(link.name, ()):
@@ -164,26 +164,23 @@ class RobotWriter:
 
     def _root_body(self, world: Element, root: Link) -> Element:
         tree = self._tree
-        if root.name == WORLD:
-            if tree.floating:
-                raise self._refusal(f"the root link {shown(WORLD)} moves freely", root)
-            if root.inertial is not None and root.inertial != Inertial():
-                self.notes.append("The inertia of the link 'world' is left out: it does not move.")
-            if tree.base_pose == IDENTITY:
+        name = root.name
+        if name == WORLD:
+            if not tree.floating and tree.base_pose == IDENTITY and root.inertial in (None, Inertial()):
                 return world
-            self.notes.append(
-                "The pose of the base is that of a <frame>: the root link 'world' is at the origin."
-            )
-            return SubElement(world, "frame", _pose_attributes(tree.base_pose))
-        body = _body(world, root.name, tree.base_pose)
+            # MJCF's world is at the origin, fixed and without mass: the link is a body of another name.
+            name = free_name(f"{WORLD}_link", {link.name for link in tree.links})
+            self._extension.texts["name"][""] = WORLD
+            self._note_names("The root link has another name", [WORLD], "dynx reads its own in <custom>")
+        body = _body(world, name, tree.base_pose)
+        if not tree.floating or name != root.name:
+            self._extension.texts["root"][""] = name
         if tree.floating:
-            name = f"{root.name}_free"
-            while any(joint.name == name for joint in tree.joints):
-                name += "_"
+            free = f"{name}_free"
+            while any(joint.name == free for joint in tree.joints):
+                free += "_"
             # Aligning would turn the frame to the principal axes.
-            SubElement(body, "freejoint", name=name, align="false")
-        else:
-            self._extension.texts["root"][""] = root.name
+            SubElement(body, "freejoint", name=free, align="false")
         return body
 
     def _add_joint(self, body: Element, joint: Joint, link: Link) -> None:
