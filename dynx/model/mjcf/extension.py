@@ -27,9 +27,10 @@ NUMBERS = ("lower", "upper", "velocity", "effort", "locked")
 and of effort [N m or N] where ``actuatorfrcrange`` cannot, its largest speed [rad/s or m/s], the position
 [rad or m] at which it was locked."""
 
-TEXTS = ("root", "name", "fixed")
+TEXTS = ("root", "name", "fixed", "link")
 """Kinds of texts: the body of the root link, and the name of that link where the body cannot have it (both
-without a name), and the name of a fixed joint by that of its link."""
+without a name), the name of a fixed joint by that of its link, and that of a link between two joints of one
+body by the joint that moves it."""
 
 
 @dataclass(frozen=True)

@@ -548,8 +548,10 @@ class _TreeReader:
             else:
                 origin = origin @ homogeneous(_NO_ROTATION, -reference * axis)
             final = number == len(body.joints) - 1 and not point.any()
-            child = body.name if final else free_name(f"{name}_link", self._taken)
+            child = body.name
             if not final:
+                own = self._extension.texts["link"].get(name)
+                child = own or free_name(f"{name}_link", self._taken)
                 self._taken.add(child)
                 self._parts.links.append(Link(child, Inertial(), element.line))
             x, y, z = axis.tolist()

@@ -12,7 +12,7 @@ theirs, limits of speed and the like are in ``<custom>`` (`dynx.model.mjcf.exten
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
@@ -21,7 +21,7 @@ import numpy as np
 
 from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, UnsupportedFeatureError, shown
-from dynx.model.elements import IDENTITY, Inertial, Joint, Limits, Link, Pose
+from dynx.model.elements import IDENTITY, ZERO, Inertial, Joint, Limits, Link, Pose
 from dynx.model.geometry import Appearance, Collision, HeightField, LinkGeometry, Mesh, Plane, Visual
 from dynx.model.geometry.stated_mesh import StatedMesh
 from dynx.model.mjcf.attributes import (
@@ -48,6 +48,9 @@ WORLD = "world"
 
 MAX_LINKS_IN_A_ROW = min(MAX_DEPTH, MAX_ELEMENT_DEPTH - 4)
 """Largest number of links in a row in a document that both MuJoCo and dynx read."""
+
+MAX_JOINTS_OF_A_BODY = 6
+"""Largest number of joints of a body that MuJoCo accepts."""
 
 MESH_SUFFIXES = (".obj", ".stl", ".msh")
 """Formats of meshes that MuJoCo reads."""
@@ -136,6 +139,7 @@ class RobotWriter:
         for frame in tree.extra_frames:
             frames.setdefault(frame.link, []).append(frame)
         self._geom_names: set[str] = set()
+        self._carried = self._links_between_joints(frames)
         # Links are in depth-first order, so that the body of the parent is there, and children keep theirs.
         for link in tree.links:
             joint = above.get(link.name)
@@ -145,14 +149,20 @@ class RobotWriter:
             else:
                 if link.name == WORLD:
                     raise self._refusal(f"link {shown(WORLD)} is not the root", link)
-                depths[link.name] = depths[joint.parent] + 1
+                depths[link.name] = depths[joint.parent] + (link.name not in self._carried)
                 if depths[link.name] > MAX_LINKS_IN_A_ROW:
                     raise self._refusal(
                         f"more than {MAX_LINKS_IN_A_ROW} links are in a row, and no deeper document is read",
                         link,
                     )
-                body = _body(bodies[joint.parent], link.name, joint.origin)
-                self._add_joint(body, joint, link)
+                if link.name in self._carried:
+                    bodies[link.name] = bodies[joint.parent]
+                    continue
+                chain = [joint]
+                while chain[0].parent in self._carried:
+                    chain.insert(0, above[chain[0].parent])
+                self._add_joints(_body(bodies[joint.parent], link.name, _end(chain)), chain, link)
+                body = bodies[joint.parent][-1]
             bodies[link.name] = body
             if body is not world and link.inertial is not None:
                 SubElement(body, "inertial", _inertial_attributes(link.inertial))
@@ -182,6 +192,43 @@ class RobotWriter:
             # Aligning would turn the frame to the principal axes.
             SubElement(body, "freejoint", name=free, align="false")
         return body
+
+    def _links_between_joints(self, frames: Mapping[str, Any]) -> set[str]:
+        """Return the links without mass, shapes and frames that join two joints whose axes are stated alike:
+        MuJoCo accepts no such body, and both joints are of the body below."""
+        tree, found = self._tree, set[str]()
+        below: dict[str, list[Joint]] = {}
+        for joint in tree.joints:
+            below.setdefault(joint.parent, []).append(joint)
+        row: dict[str, int] = {}
+        for joint in tree.joints:
+            link, next_ones = tree.link(joint.child), below.get(joint.child, [])
+            shapes = tree.geometry.links.get(link.name, LinkGeometry())
+            row[link.name] = row[joint.parent] + 1 if joint.parent in found else 1
+            if (
+                joint.moves
+                and link.inertial in (None, Inertial())
+                and [each.moves and each.origin.rpy == ZERO for each in next_ones] == [True]
+                and shapes == LinkGeometry()
+                and not (shapes.visual_fault or shapes.collision_fault)
+                and link.name not in frames
+                and link.name != WORLD
+                and row[link.name] < MAX_JOINTS_OF_A_BODY
+            ):
+                found.add(link.name)
+        return found
+
+    def _add_joints(self, body: Element, chain: Sequence[Joint], link: Link) -> None:
+        """Add the joints of a body, of which all but the last move links that are no bodies."""
+        for number, joint in enumerate(chain):
+            self._add_joint(body, joint, link)
+            if joint.child == link.name:
+                continue
+            if joint.child != f"{joint.name}_link":
+                self._extension.texts["link"][joint.name] = _checked_name(joint.child)
+            point = -sum((np.array(each.origin.xyz) for each in chain[number + 1 :]), np.zeros(3)) + 0.0
+            if point.any():
+                body[-1].set("pos", text(point))
 
     def _add_joint(self, body: Element, joint: Joint, link: Link) -> None:
         if not joint.moves:
@@ -281,7 +328,13 @@ class RobotWriter:
                 followers,
                 "dynx reads them as mimic joints",
             )
-        for reason, names in _refused_inertias(tree).items():
+        if self._carried:
+            self._note_names(
+                "Links without mass between two joints are no bodies",
+                [link.name for link in tree.links if link.name in self._carried],
+                "dynx reads them",
+            )
+        for reason, names in _refused_inertias(tree, self._carried).items():
             self._note_names(f"MuJoCo does not compile the document: {reason}", names, "dynx reads it")
 
     def _note_names(self, what: str, names: Iterable[str], effect: str) -> None:
@@ -429,8 +482,19 @@ def _inertial_attributes(inertial: Inertial) -> dict[str, str]:
     return given | {"fullinertia": text([*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]])}
 
 
-def _refused_inertias(tree: Tree) -> dict[str, list[str]]:
-    """Return the links of which MuJoCo refuses the inertia, by the reason."""
+def _end(chain: Sequence[Joint]) -> Pose:
+    """Return the pose of the last link of a chain, at position 0, in the link that carries it."""
+    origin = chain[0].origin
+    if len(chain) == 1:
+        return origin
+    T = origin.matrix
+    offset = sum((np.array(each.origin.xyz) for each in chain[1:]), np.zeros(3))
+    x, y, z = (T[:3, 3] + T[:3, :3] @ offset).tolist()
+    return Pose((x, y, z), origin.rpy)
+
+
+def _refused_inertias(tree: Tree, carried_links: Collection[str]) -> dict[str, list[str]]:
+    """Return the links of which MuJoCo refuses the inertia, by the reason, but for those without a body."""
     found: dict[str, list[str]] = {}
     carried: dict[str, bool] = {}
     above = {joint.child: joint for joint in tree.joints}
@@ -442,7 +506,7 @@ def _refused_inertias(tree: Tree) -> dict[str, list[str]]:
                 found.setdefault("an inertia is not physical", []).append(link.name)
         has = carried.get(link.name, False) or (inertial is not None and inertial.mass > 0.0)
         moves = tree.floating if joint is None else joint.moves
-        if moves and not has:
+        if moves and not has and link.name not in carried_links:
             found.setdefault("a body moves without mass", []).append(link.name)
         if joint is not None and not joint.moves:
             carried[joint.parent] = carried.get(joint.parent, False) or has

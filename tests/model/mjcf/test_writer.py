@@ -55,8 +55,10 @@ def require_same(back: Model, model: Model) -> None:
     assert back.root == model.root
     require_close(back.base_pose.matrix, model.base_pose.matrix)
     for mine, theirs in zip(back.links, model.links, strict=True):
-        assert (mine.inertial is None) == (theirs.inertial is None)
-        if mine.inertial is not None and theirs.inertial is not None:
+        if mine.inertial is None or theirs.inertial is None:
+            # A link between two joints of one body is read with zeros.
+            assert (mine.inertial or Inertial()) == (theirs.inertial or Inertial())
+        else:
             assert mine.inertial.mass == theirs.inertial.mass
             require_close(mine.inertial.origin.matrix[:3, 3], theirs.inertial.origin.matrix[:3, 3])
             want = tensor_in_link(theirs.inertial)
@@ -170,6 +172,46 @@ def test_a_mimic_joint_is_an_equality_that_mujoco_holds() -> None:
 def test_gravity_base_and_frames(base: str) -> None:
     model = pair(HINGE, base=base, gravity=(0.5, 0.0, -1.62)).with_frame("tip", "b", Pose((0.0, 0.1, 0.2)))
     require_same(dynx.load(model.to_mjcf()), model)
+
+
+RANGE = Limits(-1.0, 2.0)
+
+
+def test_links_without_mass_between_joints_are_joints_of_one_body() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    joints = [
+        Joint(
+            "x", "revolute", "base", "first", Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)), limits=Limits(-1.0, 2.0)
+        ),
+        Joint("y", "prismatic", "first", "second", Pose((0.0, 0.3, 0.1)), axis=(0.0, 0.6, 0.8)),
+        Joint("z", "continuous", "second", "hand", Pose((0.2, 0.0, 0.0)), axis=(0.0, 0.0, 1.0)),
+        Joint("turned", "continuous", "hand", "wrist", Pose((0.0, 0.0, 0.1), (0.1, 0.0, 0.0))),
+        Joint("tool", "continuous", "wrist", "tip", Pose((0.0, 0.0, 0.1))),
+    ]
+    body = Inertial(1.0, Pose((0.1, 0.0, 0.0)), 0.1, 0.0, 0.0, 0.1, 0.0, 0.1)
+    light = ("first", "second", "wrist")
+    links = [Link(name, None if name in light else body) for name in ("base", *light, "hand", "tip")]
+    model = Model.build("r", links, joints)
+    for base in ("fixed", "floating"):
+        robot = model.with_base(base)
+        require_same(dynx.load(robot.to_mjcf()), robot)
+        compiled = mujoco.MjModel.from_xml_string(robot.to_mjcf())
+        assert compiled.nbody == 4
+        want = compute(mujoco, compiled, 0, free=robot.floating)
+        engine = dynx.backend("reference", robot)
+        require_close(engine.mass_matrix(want.q), want.mass_matrix, 1e-11)
+        require_close(engine.inverse_dynamics(want.q, want.v, want.a), want.torques, 1e-11)
+
+
+def test_a_body_has_at_most_six_joints() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    count = 9
+    joints = [Joint(f"j{n}", "prismatic", f"a{n}", f"a{n + 1}", Pose((0.1, 0.0, 0.0))) for n in range(count)]
+    body = Inertial(1.0, Pose(), 1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+    links = [Link(f"a{n}", body if n in (0, 6, count) else None) for n in range(count + 1)]
+    model = Model.build("r", links, joints)
+    require_same(dynx.load(model.to_mjcf()), model)
+    assert mujoco.MjModel.from_xml_string(model.to_mjcf()).njnt == count
 
 
 def test_a_fixed_root_called_world_is_the_world() -> None:
