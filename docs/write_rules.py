@@ -31,6 +31,8 @@ GROUPS = {
     "3": "Joint dynamics",
     "4": "Text",
     "5": "Practice",
+    "6": "MJCF",
+    "7": "SDF",
 }
 
 

@@ -67,11 +67,12 @@ from dynx.doctor.report import (
 from dynx.errors import ArgumentError, DescriptionError, DynxError, UnknownNameError, nearest, shown
 from dynx.loaded import COMMON_VARIANTS, ENGINES, VARIANTS, engine_of, installed_engines, loader_class
 from dynx.loaded.difference import model_difference
+from dynx.loaded.robot import LoadedRobot, format_name
 from dynx.model import Model
 from dynx.model.documents import bare_urdf
-from dynx.model.loading import read_description
+from dynx.model.loading import read_description, read_model
 from dynx.model.numbers import checked_seed, is_real, whole_number
-from dynx.model.tree import Base, checked_base
+from dynx.model.tree import STANDARD_GRAVITY, Base, checked_base, format_of_root
 from dynx.model.xml.source import XmlSource
 from dynx.rules import LEVELS, CallingRule, Case, Detection, Level, Rule, all_rules
 from dynx.rules.case import end_of
@@ -94,8 +95,12 @@ def first_report(case: Case, before: Examination, tolerance: float) -> DoctorRep
     referee = referee_error(before.reference)
     descriptions = [each.description for each in before.outputs.values() if each.description is not None]
     model = before.reference.model
+    stated = STANDARD_GRAVITY
+    if case.form != "urdf" and isinstance(case.reading, Model):
+        stated = case.reading.gravity
     return DoctorReport(
         robot=model.name,
+        format=case.form,
         source=case.source.source,
         base=case.base,
         total_mass=sum(link.inertial.mass for link in model.links if link.inertial is not None),
@@ -105,7 +110,7 @@ def first_report(case: Case, before: Examination, tolerance: float) -> DoctorRep
         tolerance=max(tolerance, min(REFERENCE_MARGIN * referee, MAX_RAISED_TOLERANCE)),
         pairs=_pairs(before),
         referee=referee,
-        model_difference=tuple(model_difference(model, descriptions)),
+        model_difference=tuple(model_difference(model.with_gravity(stated), descriptions)),
         refusal=None if isinstance(case.reading, Model) else _failure(case.reading),
         text=case.source.text,
         form=case.source.form,
@@ -117,7 +122,12 @@ def _failure(error: DynxError) -> LoadFailure:
 
 
 def with_meshes(report: DoctorReport, source: XmlSource) -> DoctorReport:
-    """Add the mesh files that the description names and that were not read."""
+    """Add the mesh files that the description names and that were not read.
+
+    Of MJCF and SDF the reader refuses those on which a mass depends, and no other is needed.
+    """
+    if report.format != "urdf":
+        return report
     named = list(named_meshes(source))
     parts = parts_with_meshes(source)
     kinds = {each.engine: loader_class(each.engine) for each in report.engines}
@@ -137,8 +147,11 @@ def with_meshes(report: DoctorReport, source: XmlSource) -> DoctorReport:
     return replace(report, meshes=len(named), unread_meshes=tuple(unread))
 
 
-def with_after(report: DoctorReport, after: Examination, proved: Examination) -> DoctorReport:
-    """Add the errors of the engines on the mended file, and the largest one once all causes are removed."""
+def with_after(
+    report: DoctorReport, after: Examination, proved: Examination, known: Collection[str] = ()
+) -> DoctorReport:
+    """Add the errors of the engines on the mended file, and the largest one once all causes are removed, but
+    for the engines in which a `known` cause remains."""
     engines = tuple(
         replace(
             each,
@@ -148,7 +161,8 @@ def with_after(report: DoctorReport, after: Examination, proved: Examination) ->
         )
         for each in report.engines
     )
-    return replace(report, engines=engines, residual=_residual(proved))
+    outputs = {name: each for name, each in proved.outputs.items() if name not in known}
+    return replace(report, engines=engines, residual=_residual(replace(proved, outputs=outputs)))
 
 
 def variant_result(
@@ -177,7 +191,7 @@ def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
     return EngineResult(
         engine=name,
         version=kind.engine_version(),
-        call=kind.load_call(case.base == "floating", before.reference.model.root),
+        call=_load_call(kind, case, before.reference.model.root),
         refused=output.refused,
         refused_after=output.refused,
         not_used=output.not_used,
@@ -185,6 +199,14 @@ def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
         before=errors,
         after=errors,
         step_defaults=kind.STEP_DEFAULTS if moves and output.no_results is None else {},
+    )
+
+
+def _load_call(kind: type[LoadedRobot], case: Case, root: str) -> str:
+    floating = case.base == "floating"
+    # Engines of other packages, which load URDF alone, need not know of formats.
+    return (
+        kind.load_call(floating, root) if case.form == "urdf" else kind.load_call(floating, root, case.form)
     )
 
 
@@ -267,6 +289,8 @@ def with_original_names(findings: Iterable[Finding], given: XmlSource) -> tuple[
 
 
 def _with_original_names(finding: Finding, given: XmlSource) -> Finding:
+    if format_of_root(given.root.tag) != "urdf":
+        return finding
     found = {"link": finding.link, "joint": finding.joint}
     known = {tag: {part.attributes.get("name") for part in given.root.all(tag)} for tag in found}
     known["link"] |= {end_of(each, end) for each in given.root.all("joint") for end in ("parent", "child")}
@@ -416,7 +440,7 @@ Robot = str | os.PathLike[str] | bytes | Model
 def diagnose(
     robot: Robot,
     *,
-    base: Base = "fixed",
+    base: Base | None = None,
     engines: Sequence[str] | None = None,
     samples: int = DEFAULT_SAMPLES,
     seed: int = 0,
@@ -431,13 +455,14 @@ def diagnose(
 ) -> DoctorReport:
     """Find and prove the causes for which engines that load this robot's file differ, and mend the file.
 
-    `robot` is any argument of `dynx.load`. `engines` are names of `dynx.loaded.ENGINES` and of
-    `dynx.loaded.VARIANTS` (default: all engines that are installed). Each loads the file by its documented
-    call and is compared with reference values at `samples` random states that follow from `seed`, in tilted
-    gravity; a relative error above `tolerance` is a difference. By default common variants are examined too
-    (`DoctorReport.variants`); they differ by the user's call, which no file can mend, so they count as
-    differences only if `engines` names them. The mended file has no effect above `fix_tolerance`, with which
-    its new numbers have the fewest digits that keep every engine within a tenth of it (default: no effect
+    `robot` is any argument of `dynx.load`. `base` is that of a robot in URDF, ``"fixed"`` by default;
+    MJCF and SDF state it. `engines` are names of `dynx.loaded.ENGINES` and of `dynx.loaded.VARIANTS`
+    (default: all engines that are installed and load files of this format). Each loads the file by its
+    documented call and is compared with reference values at `samples` random states that follow from `seed`,
+    in tilted gravity; a relative error above `tolerance` is a difference. By default common variants are
+    examined too (`DoctorReport.variants`); they differ by the user's call, which no file can mend, so they
+    count as differences only if `engines` names them. The mended file has no effect above `fix_tolerance`,
+    with which its new numbers have the fewest digits that keep every engine within a tenth of it (default: no effect
     above `tolerance`, and all digits). `choose` maps rule ids to one of the rule's `choices`. `level` is the
     largest change of the mended file: ``safe`` changes nothing that a reader notices, ``rounding`` the
     equations of motion by rounding only, ``physics`` whatever the causes require. `ignore` has ids or names
@@ -454,7 +479,8 @@ def diagnose(
     examiner, variants = _examiners(engines, samples, seed, tolerance)
     choices = checked_choices((choose or {}).items())
     not_counted = ignored_rules(ignore, only)
-    checked_base(base)
+    if base is not None:
+        checked_base(base)
     if fix_tolerance is not None and not (is_real(fix_tolerance) and 0.0 < fix_tolerance < 1.0):
         raise ArgumentError(
             f"fix_tolerance is {shown(fix_tolerance)}; wanted a relative error between 0 and 1"
@@ -465,14 +491,17 @@ def diagnose(
     case = None
     try:
         case = open_case(robot, base, choices)
+        examiner, variants = _of_format(case, examiner, variants, engines)
         report = _diagnosis_of(
             case, examiner, variants, tolerance, fix_tolerance, counterexamples, seed, level, progress
         )
     except DynxError as error:
-        report = refused_report(str(_label(robot)), error, base=base)
+        report = refused_report(str(_label(robot)), error, base=base or "fixed")
         if case is not None:
             left = all_findings(left_undone(case), [], Mending(case), examiner.engines)
             report = replace(report, findings=left)
+    finally:
+        examiner.close()
     seconds = time.perf_counter() - started
     tolerance = max(report.tolerance, tolerance)
     ignored = Counter(each.rule for each in report.findings if each.rule in not_counted)
@@ -490,7 +519,7 @@ def diagnose(
 def compare_as_loaded(
     robot: Robot,
     *,
-    base: Base = "fixed",
+    base: Base | None = None,
     engines: Sequence[str] | None = None,
     samples: int = DEFAULT_SAMPLES,
     seed: int = 0,
@@ -502,29 +531,53 @@ def compare_as_loaded(
     """
     started = time.perf_counter()
     examiner, variants = _examiners(engines, samples, seed, tolerance)
-    checked_base(base)
+    if base is not None:
+        checked_base(base)
     try:
         case = open_case(robot, base, {})
+        examiner, variants = _of_format(case, examiner, variants, engines)
         _, before, report = _loaded(case, examiner, tolerance)
         beside = variants_as_loaded(case, before.reference, variants)
         report = replace(report, variants=beside, causes_searched=False)
     except DynxError as error:
-        report = refused_report(str(_label(robot)), error, base=base)
+        report = refused_report(str(_label(robot)), error, base=base or "fixed")
+    finally:
+        examiner.close()
     seconds = time.perf_counter() - started
     tolerance = max(report.tolerance, tolerance)
     return replace(report, samples=samples, seed=seed, tolerance=tolerance, seconds=seconds)
 
 
-def open_case(robot: Robot, base: Base, choices: Mapping[str, str]) -> Case:
+def _of_format(
+    case: Case, examiner: Examiner, variants: Examiner, engines: Sequence[str] | None
+) -> tuple[Examiner, Examiner]:
+    """Leave out the engines that load no file of the format of the case, unless the user named them."""
+    if case.form == "urdf":
+        return examiner, variants
+    if engines is None:
+        examiner = examiner.for_format(case.form)
+        if not examiner.engines:
+            raise ArgumentError(f"no engine that is installed loads {format_name(case.form)}")
+    return examiner, variants.for_format(case.form)
+
+
+def open_case(robot: Robot, base: Base | None, choices: Mapping[str, str]) -> Case:
     """Read the document of a robot as a case; raises the errors of `dynx.load`, and DescriptionError for a
-    document larger than is examined."""
+    document larger than is examined.
+
+    The base of MJCF and SDF is that of the file.
+    """
     if isinstance(robot, Model):
         document = XmlSource(bare_urdf(robot), robot.source)
     else:
         data, source, _ = read_description(robot)
         document = XmlSource(data, source)
     require_bounded(document)
-    return Case(document, base, choices=choices)
+    case = Case(document, base or "fixed", choices=choices)
+    if case.form == "urdf":
+        return case
+    model = read_model(document.text_with_lines_before, document.source, base=base)
+    return replace(case, base=model.base)
 
 
 def refused_report(robot: str, error: DynxError, *, base: str | None = None) -> DoctorReport:
@@ -582,8 +635,13 @@ def _diagnosis_of(
     )
     found = _with_contacts(found, best, case, case.with_source(full.case.source), seed)
     left = _engines_without_remedy(best.mending.case, rules, examiner.engines)
-    unexplained = _unexplained(best.examination, tolerance, left)
-    if unexplained and counterexamples:
+    stated = _stated_effects(best, rules, examiner.engines, tolerance)
+    known = {engine for effects in stated.values() for engine in effects}
+    unexplained = tuple(
+        each for each in _unexplained(best.examination, tolerance, left) if each.engine not in known
+    )
+    # Smaller robots are made of URDF.
+    if unexplained and counterexamples and case.form == "urdf":
         unexplained = _with_counterexamples(
             best.mending.case, unexplained, examiner, tolerance, seed, progress
         )
@@ -596,9 +654,12 @@ def _diagnosis_of(
         last = examiner.examine(mended.case, reference=examiner.reference(readable(mended.case).case))
     withheld = reading_change(case, mended)
     return replace(
-        with_after(report, last, best.examination),
-        findings=with_original_names(
-            all_findings(found, best.proofs, mended, examiner.engines, refusing_rules(case)), case.source
+        with_after(report, last, best.examination, known),
+        findings=_with_stated(
+            with_original_names(
+                all_findings(found, best.proofs, mended, examiner.engines, refusing_rules(case)), case.source
+            ),
+            stated,
         ),
         unexplained=unexplained,
         choices=(*mended.choices, *filter(None, [sentence])),
@@ -674,6 +735,47 @@ def _with_contacts(
         (rule, replace(each, message=f"{each.message}: {texts[rule]}") if texts.get(rule) else each)
         for rule, each in found
     ]
+
+
+def _stated_effects(
+    best: SelectedPlaces, rules: Sequence[Rule], engines: Collection[str], tolerance: float
+) -> dict[str, dict[str, Effect]]:
+    """Return what remains of the difference in each engine, by the rules that state an omission of it.
+
+    A cause accounts for no more than its bound. Of several causes in one engine each may be the one.
+    """
+    found: dict[str, dict[str, Effect]] = {}
+    examination = best.examination
+    for rule in rules:
+        if not rule.stated or not rule.detect(best.mending.case):
+            continue
+        for engine in rule.named_of(engines):
+            output = examination.outputs[engine]
+            errors = examination.errors(engine)
+            quantity = max(errors, key=lambda name: errors[name], default=None)
+            if output.no_results is not None:
+                effect = Effect(output.missing, float("inf"))
+            elif quantity is not None and errors[quantity] > tolerance:
+                effect = Effect(quantity, errors[quantity])
+            else:
+                continue
+            if effect.relative_error <= rule.stated_bound:
+                found.setdefault(rule.id, {})[engine] = effect
+    return found
+
+
+def _with_stated(
+    findings: Iterable[Finding], stated: Mapping[str, Mapping[str, Effect]]
+) -> tuple[Finding, ...]:
+    """Give the findings of stated omissions their effects."""
+    changed = []
+    for finding in findings:
+        effects = stated.get(finding.rule)
+        if effects:
+            largest = max(effects.values(), key=lambda effect: effect.relative_error)
+            finding = replace(finding, engines=tuple(effects), effect=largest, effects=dict(effects))
+        changed.append(finding)
+    return tuple(changed)
 
 
 def _engines_without_remedy(mended: Case, rules: Sequence[Rule], engines: Collection[str]) -> set[str]:

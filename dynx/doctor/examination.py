@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
@@ -16,14 +18,14 @@ from dynx.agreement.tolerances import BAR
 from dynx.backends.solvability import singular_coordinates
 from dynx.doctor.lines import line_opcodes, lines_of
 from dynx.engines.silence import silence
-from dynx.errors import DescriptionError, DynxError, UnsupportedFeatureError, UnusableEngineError
+from dynx.errors import DescriptionError, DynxError, UnusableEngineError
 from dynx.files.temporary import temporary_folder
 from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.model import Model
 from dynx.model.elements import Vector
 from dynx.model.geometry.formats.facets import STL_FACET
 from dynx.model.loading import read_model
-from dynx.model.tree import Base
+from dynx.model.tree import Base, Format, format_of_root
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Detection, Rule
@@ -31,6 +33,7 @@ from dynx.rules.case import Case
 from dynx.rules.geometry import bullet_box, collision_meshes, has_shape, may_be_refused, texture_replacements
 from dynx.rules.inertia import has_inertial_data
 from dynx.spatial.scalar import Floats
+from dynx.workers import Workers
 
 # Collision meshes for PyBullet's plain call, each replaced by the eight corners of its bounding box.
 #
@@ -122,7 +125,12 @@ _BOX = '<box size="1 1 1"/>'
 
 def without_meshes(source: XmlSource, *, collisions: bool = True) -> XmlSource:
     """Remove visual shapes, textures that engines find and, with `collisions`, collision shapes that are
-    meshes. Visuals for which an engine may refuse the file are left, with a box in place of a mesh file."""
+    meshes. Visuals for which an engine may refuse the file are left, with a box in place of a mesh file.
+
+    In MJCF and SDF masses may follow from meshes, so that these documents stay as they are.
+    """
+    if format_of_root(source.root.tag) != "urdf":
+        return source
     links = source.root.all("link")
     visuals = [shape for link in links for shape in link.all("visual") if has_shape(shape)]
     left = [shape for shape in visuals if may_be_refused(shape)]
@@ -139,15 +147,59 @@ def _named_meshes(shape: SourceElement) -> list[SourceElement]:
     return [each for each in shape.walk() if each.tag == "mesh" and each.attributes.get("filename")]
 
 
+_SUFFIXES: Mapping[Format, str] = {"urdf": ".urdf", "mjcf": ".xml", "sdf": ".sdf"}
+
+_FOLDERS_ABOVE = 4
+"""Largest number of folders above a document in MJCF or SDF in which it may name files, as in
+``../meshes/arm.stl``."""
+
+_ABOVE = re.compile(r"(?:\.\./)+")
+
+
 @contextmanager
-def temporary_urdf(source: XmlSource, *, mesh_boxes: bool = False) -> Iterator[Path]:
+def temporary_document(source: XmlSource, *, mesh_boxes: bool = False) -> Iterator[Path]:
     """Write the document, with `mesh_boxes` in place of collision meshes, to a file that exists while the
-    context lasts."""
+    context lasts.
+
+    A document in MJCF or SDF includes files and names meshes by their place relative to its own. Links to
+    these stand beside the file.
+    """
+    form = format_of_root(source.root.tag)
     with temporary_folder() as folder:
-        path = folder / "robot.urdf"
+        if form != "urdf":
+            folder = _linked_folder(folder, Path(source.source), _folders_above(source.text))
+        path = folder / f"robot{_SUFFIXES[form]}"
+        if path.is_symlink():
+            path.unlink()
         written = with_mesh_boxes(source, folder) if mesh_boxes else source
         path.write_bytes(written.to_bytes())
         yield path
+
+
+def _folders_above(text: str) -> int:
+    """Return the number of folders above a document in which it names files; of its includes it is not
+    known."""
+    if "<include" in text:
+        return _FOLDERS_ABOVE
+    return min(max((len(each) // 3 for each in _ABOVE.findall(text)), default=0), _FOLDERS_ABOVE)
+
+
+def _linked_folder(folder: Path, document: Path, levels: int) -> Path:
+    """Make folders below `folder` as those of a document and `levels` above, each with links to what is in
+    it; return the innermost. There are no links where the document is no file."""
+    if not document.is_file():
+        return folder
+    above = list(document.resolve().parents)[: levels + 1]
+    made = folder
+    for k in range(len(above) - 1, -1, -1):
+        below = above[k - 1].name if k else None
+        for entry in above[k].iterdir():
+            if entry.name != below:
+                (made / entry.name).symlink_to(entry)
+        if below is not None:
+            made = made / below
+            made.mkdir()
+    return made
 
 
 STATES = 500
@@ -210,7 +262,7 @@ def links_in_contact(case: Case, engine: str, seed: int) -> Mapping[tuple[str, s
     source, owners = _with_named_shapes(without_meshes(case.source))
     found: dict[tuple[str, str], LinkContact] = {}
     with (
-        temporary_urdf(source) as path,
+        temporary_document(source) as path,
         silence(),
         loader_class(engine)(path, model) as robot,
     ):
@@ -323,7 +375,13 @@ class ReferenceValues:
 
 
 def model_without_mimics(source: XmlSource, base: Base) -> Model:
-    """Read the robot of a document in the coordinates of all its moving joints, in tilted gravity."""
+    """Read the robot of a document in the coordinates of all its moving joints, in tilted gravity.
+
+    The base of MJCF and SDF is that of the document.
+    """
+    if format_of_root(source.root.tag) != "urdf":
+        model = read_model(source.text, source.source, gravity=TILTED_GRAVITY)
+        return replace(model, joints=tuple(replace(joint, mimic=None) for joint in model.joints))
     joints = source.root.all("joint")
     followers = [mimic for joint in joints for mimic in joint.all("mimic")]
     free = source.apply(*(source.removal(mimic) for mimic in followers)) if followers else source
@@ -447,19 +505,17 @@ MAX_CHAIN = 500
 
 
 def require_bounded(source: XmlSource) -> None:
-    """Raise DescriptionError for a document larger than is examined, or of a format that is not."""
-    other = {"mujoco": "MJCF", "sdf": "SDF"}.get(source.root.tag)
-    if other is not None:
-        raise UnsupportedFeatureError(
-            f"the doctor examines URDF, and this is {other}; dynx agree compares the engines on it",
-            source=source.source,
-            line=source.root.line,
-        )
+    """Raise DescriptionError for a document larger than is examined.
+
+    The reader itself bounds the links of MJCF and SDF.
+    """
     if len(source.data) > MAX_BYTES:
         _refuse(source, None, f"has {len(source.data)} bytes; at most {MAX_BYTES} are examined")
     for number, element in enumerate(source.root.walk()):
         if number >= MAX_ELEMENTS:
             _refuse(source, element, f"has more than {MAX_ELEMENTS} elements, the most that are examined")
+    if format_of_root(source.root.tag) != "urdf":
+        return
     links = source.root.all("link")
     if len(links) > MAX_LINKS:
         excess = links[MAX_LINKS]
@@ -628,8 +684,12 @@ class Examiner:
         samples: int,
         seed: int,
         positions: Mapping[str, float] | None = None,
+        apart: EngineProcess | None = None,
     ) -> None:
-        """`seed` selects the random states; `positions` of the joints, by name, are one more state."""
+        """`seed` selects the random states; `positions` of the joints, by name, are one more state.
+        `apart` is the process in which engines load MJCF and SDF.
+        """
+        self._apart = apart or EngineProcess()
         self.engines = {name: loader_class(name) for name in engines}
         self._samples = samples
         self.seed = seed
@@ -639,11 +699,20 @@ class Examiner:
 
     def with_samples(self, samples: int) -> Examiner:
         """Return an examiner with the same engines and seed, and another number of states."""
-        return Examiner(self.engines, samples, self.seed, self._positions)
+        return Examiner(self.engines, samples, self.seed, self._positions, self._apart)
+
+    def for_format(self, form: Format) -> Examiner:
+        """Return an examiner with those of the engines that load files of a format."""
+        loading = [name for name, kind in self.engines.items() if form in kind.FORMATS]
+        return Examiner(loading, self._samples, self.seed, self._positions, self._apart)
+
+    def close(self) -> None:
+        """End the process in which engines load MJCF and SDF."""
+        self._apart.close()
 
     def at(self, positions: Mapping[str, float]) -> Examiner:
         """Return an examiner that examines the same states, and one with the joints at these positions."""
-        return Examiner(self.engines, self._samples, self.seed, positions)
+        return Examiner(self.engines, self._samples, self.seed, positions, self._apart)
 
     def reference(self, case: Case) -> ReferenceValues:
         """Compute the reference values of a case at random states."""
@@ -656,7 +725,12 @@ class Examiner:
         if self._positions is not None:
             states = with_positions(model, states, self._positions)
         values = reference_values(model, states)
-        return replace(values, kinematics_only=not has_inertial_data(Case(source, base)))
+        kinematics_only = not has_inertial_data(Case(source, base))
+        if format_of_root(source.root.tag) != "urdf":
+            moved = {joint.child for joint in model.joints}
+            massive = (each.inertial for each in model.links if model.floating or each.name in moved)
+            kinematics_only = not any(each and (each.mass or each.tensor.any()) for each in massive)
+        return replace(values, kinematics_only=kinematics_only)
 
     def examine(
         self,
@@ -672,14 +746,25 @@ class Examiner:
         chosen = [name for name in self.engines if engines is None or name in engines]
         with ExitStack() as files:
             paths = {
-                meshes: files.enter_context(temporary_urdf(text, mesh_boxes=meshes))
+                meshes: files.enter_context(temporary_document(text, mesh_boxes=meshes))
                 for meshes, text in self._engine_inputs(case, chosen)
             }
-            outputs = {
-                name: self._evaluate(name, paths[self.engines[name].loads_meshes], case, reference, describe)
+            tasks = [
+                EngineTask(
+                    name,
+                    self.engines[name],
+                    paths[self.engines[name].loads_meshes],
+                    case.calls,
+                    reference,
+                    describe,
+                )
                 for name in chosen
-            }
-        return Examination(reference, outputs)
+            ]
+            # The readers of these formats end the process more often than those of URDF, for which dynx
+            # knows each such fault.
+            found = map(evaluate, tasks) if case.form == "urdf" else self._apart.evaluate(tasks)
+            outputs = {output.engine: output for output in found}
+        return Examination(reference, {name: outputs[name] for name in chosen})
 
     def without_unused(self, source: XmlSource) -> XmlSource:
         """Remove the shapes that none of the engines loads."""
@@ -690,26 +775,69 @@ class Examiner:
         for meshes in {self.engines[name].loads_meshes for name in chosen}:
             yield meshes, without_meshes(case.source, collisions=not meshes)
 
-    def _evaluate(
-        self, engine: str, path: Path, case: Case, reference: ReferenceValues, describe: bool
-    ) -> EngineOutput:
-        try:
-            # Output of engines is suppressed; the report contains their messages in order.
-            with (
-                silence(),
-                np.errstate(all="ignore"),
-                self.engines[engine](path, reference.model, case.calls) as robot,
-            ):
-                return _outputs_of(engine, robot, reference, describe)
-        except UnicodeDecodeError:
-            # Raised by bindings that return names as text, for bytes of another encoding.
-            return EngineOutput(engine, refused=f"{engine} cannot return names that are not in UTF-8")
-        except DynxError as error:
-            # The name of the temporary file differs each time, so it is removed from messages.
-            reason = str(error).replace(str(path), path.name)
-            if isinstance(error, UnusableEngineError):
-                return EngineOutput(engine, not_used=reason)
-            return EngineOutput(engine, refused=reason)
+
+@dataclass(frozen=True, eq=False)
+class EngineTask:
+    """A file to load in one engine, and the reference values with which it is compared."""
+
+    engine: str
+    kind: type[LoadedRobot]
+    path: Path
+    calls: frozenset[str]
+    reference: ReferenceValues
+    describe: bool
+
+
+def evaluate(task: EngineTask) -> EngineOutput:
+    """Load the file of a task and compute the deviations of the engine."""
+    engine, path = task.engine, task.path
+    try:
+        # Output of engines is suppressed; the report contains their messages in order.
+        with (
+            silence(),
+            np.errstate(all="ignore"),
+            task.kind(path, task.reference.model, task.calls) as robot,
+        ):
+            return _outputs_of(engine, robot, task.reference, task.describe)
+    except UnicodeDecodeError:
+        # Raised by bindings that return names as text, for bytes of another encoding.
+        return EngineOutput(engine, refused=f"{engine} cannot return names that are not in UTF-8")
+    except DynxError as error:
+        # The name of the temporary file differs each time, so it is removed from messages.
+        reason = str(error).replace(str(path), path.name).replace(f"{path.parent}{os.sep}", "")
+        if isinstance(error, UnusableEngineError):
+            return EngineOutput(engine, not_used=reason)
+        return EngineOutput(engine, refused=reason)
+
+
+MAX_ENGINE_TIME = 60.0
+"""Time limit [s] of one engine on one file in MJCF or SDF, loading and all quantities."""
+
+
+class EngineProcess:
+    """A process in which engines load files, so that an engine that ends it ends no more than that."""
+
+    def __init__(self) -> None:
+        self._workers: Workers | None = None
+
+    def evaluate(self, tasks: Sequence[EngineTask]) -> Iterator[EngineOutput]:
+        """Yield the output of each task; an engine that ended the process, or took too long, is not used."""
+        if self._workers is None:
+            self._workers = Workers(evaluate, 1, MAX_ENGINE_TIME)
+        for result in self._workers.run(tasks):
+            if result.failure is None:
+                yield result.value
+            elif result.failure.kind == "defect":
+                raise result.failure.error
+            else:
+                engine = tasks[result.index].engine
+                yield EngineOutput(engine, not_used=f"{engine} {result.failure.message} on this file")
+
+    def close(self) -> None:
+        """End the process."""
+        if self._workers is not None:
+            self._workers.close()
+            self._workers = None
 
 
 def _outputs_of(engine: str, robot: LoadedRobot, reference: ReferenceValues, describe: bool) -> EngineOutput:

@@ -19,6 +19,7 @@ from dynx.files.documents import document_of, to_json_values
 from dynx.files.pages import html_grid
 from dynx.loaded import engine_of
 from dynx.loaded.difference import Deviation
+from dynx.model.tree import Format
 from dynx.model.xml.text import TextForm
 from dynx.rules.registry import all_rules
 from dynx.rules.rule import Kind, Level
@@ -212,6 +213,8 @@ class DoctorReport:
 
     robot: str
     source: str | None = None
+    format: Format = "urdf"
+    """Format of the file."""
     base: str | None = None
     total_mass: float | None = None
     """Sum of the masses of all links [kg], as the file states them; None where it was not examined."""
@@ -421,6 +424,7 @@ class DoctorEntry:
 
     robot: str
     source: str | None
+    format: Format
     base: str | None
     total_mass: float | None
     kinematics_only: bool

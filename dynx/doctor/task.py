@@ -22,7 +22,7 @@ class DoctorTask:
     """
 
     robot: str
-    base: Base
+    base: Base | None
     engines: tuple[str, ...] | None = None
     samples: int | None = None
     seed: int = 0
@@ -62,7 +62,7 @@ def examine(task: DoctorTask) -> DoctorReport:
 
 def refused(task: DoctorTask, error: DynxError) -> DoctorReport:
     """Report a robot that could not be examined."""
-    return refused_report(task.robot, error, base=task.base)
+    return refused_report(task.robot, error, base=task.base or "fixed")
 
 
 def check_engines(names: Sequence[str] | None) -> None:

@@ -8,14 +8,14 @@ connect, merged inertias are compared. Equivalent forms are not deviations: an a
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from dynx.loaded.robot import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.model import Joint, Model
-from dynx.model.tree import STANDARD_GRAVITY
+from dynx.model.elements import Inertial
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
 from dynx.spatial.so3 import rpy_from_rotation
@@ -105,6 +105,8 @@ class Deviation:
     ``friction``, ``armature``; of the base ``position``, ``rotation``; ``default``, of gravity."""
     file: Any
     engine_value: Any
+    line: int | None = None
+    """Line of the part in the file; None where the file does not state it."""
 
 
 Row = tuple[str, str, str, Any, Any]
@@ -116,12 +118,19 @@ def model_difference(model: Model, loaded: Iterable[LoadedModel]) -> tuple[Devia
     The inertia of the root link of a fixed base is not compared: no result depends on it, and some engines
     drop it. `model` has the base with which the engines loaded the file.
     """
-    return tuple(Deviation(each.engine, *row) for each in loaded for row in _rows(model, each))
+    lines = {("link", link.name): link.line for link in model.links}
+    lines |= {("joint", joint.name): joint.line for joint in model.joints}
+    return tuple(
+        Deviation(each.engine, *row, line=lines.get((row[0], row[1])))
+        for each in loaded
+        for row in _rows(model, each)
+    )
 
 
 def _rows(model: Model, engine: LoadedModel) -> Iterator[Row]:
     reach = _reach(model)
-    yield from _links(model, engine, reach)
+    added = _added_links(model)
+    yield from _links(model, engine, reach, added)
     for joint in model.joints:
         if not joint.moves:
             continue
@@ -129,35 +138,50 @@ def _rows(model: Model, engine: LoadedModel) -> Iterator[Row]:
         if held is None:
             yield "joint", joint.name, "existence", joint.type, None
         else:
+            if added & {joint.parent, joint.child}:
+                # Engines place these joints from the bodies, which the links in between are not.
+                held = replace(held, placement=None)
             for property, file, value in _joint(joint, held, reach):
                 yield "joint", joint.name, property, file, value
     for name in engine.joints:
         if name not in {joint.name for joint in model.joints if joint.moves}:
             yield "joint", name, "existence", None, engine.joints[name].type
-    for property, file, value in _pose(np.eye(4), engine.base_frame, reach):
+    for property, file, value in _pose(model.base_pose.matrix, engine.base_frame, reach):
         yield "base", model.root, property, file, value
-    if _differ(np.array(STANDARD_GRAVITY), engine.gravity):
-        yield "gravity", "gravity", "default", list(STANDARD_GRAVITY), engine.gravity.tolist()
+    if _differ(np.array(model.gravity), engine.gravity):
+        yield "gravity", "gravity", "default", list(model.gravity), engine.gravity.tolist()
+
+
+def _added_links(model: Model) -> set[str]:
+    """Return the links without mass that stand between the joints of one body of MJCF or SDF."""
+    own = Inertial()
+    return {
+        link.name
+        for link in model.links
+        if link.inertial is not None and link.inertial.line is None and link.inertial == own
+    }
 
 
 # -- links --------------------------------------------------------------------------------------
 
 
-def _links(model: Model, engine: LoadedModel, reach: float) -> Iterator[Row]:
+def _links(model: Model, engine: LoadedModel, reach: float, added: set[str]) -> Iterator[Row]:
     merged = {name for inertial in engine.links.values() for name in inertial.merged}
     placements = rigid_placements(model)
     for link in model.links:
         held = engine.links.get(link.name)
         static = not model.floating and placements[link.name][0] == model.root
         if held is None:
-            if not static and link.name not in merged:
+            if not static and link.name not in merged and link.name not in added:
                 yield "link", link.name, "existence", True, False
         elif not (static and link.name == model.root):
             for property, file, value in _inertial(model, placements, link.name, engine.links, reach):
                 yield "link", link.name, property, file, value
     known = {link.name for link in model.links}
     for name in engine.links:
-        if name not in known:
+        held = engine.links[name]
+        # Engines add links without mass between the joints of one body.
+        if name not in known and (held.mass or held.inertia.any()):
             yield "link", name, "existence", False, True
 
 

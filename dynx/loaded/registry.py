@@ -66,14 +66,14 @@ def installed_engines() -> tuple[str, ...]:
 def load_as(
     engine: str, path: str | os.PathLike[str], model: Model, calls: Collection[str] = ()
 ) -> LoadedRobot:
-    """Return the robot as `engine` loads it from the URDF file at `path`; see `LoadedRobot`.
+    """Return the robot as `engine` loads it from the file at `path`, in URDF, MJCF or SDF; see `LoadedRobot`.
 
     Use it in a ``with`` statement, or close it. Raises RobotNotFoundError where there is no such file.
     """
     file = Path(path)
     if not file.is_file():
         raise RobotNotFoundError(
-            f"no file {shown(path)}; wanted the path of a URDF file, which {shown(engine)} loads itself"
+            f"no file {shown(path)}; wanted the path of a file, which {shown(engine)} loads itself"
         )
     return loader_class(engine)(file, model, calls)
 

@@ -11,8 +11,10 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from dynx.errors import EngineError, UnusableEngineError, shown
+from dynx.errors import DescriptionError, EngineError, UnusableEngineError, shown
 from dynx.model import Model
+from dynx.model.tree import Format, format_of_root
+from dynx.model.xml.source import XmlSource
 from dynx.spatial.scalar import Floats
 
 Bounds = tuple[float, float]
@@ -74,7 +76,7 @@ Self = TypeVar("Self", bound="LoadedRobot")
 
 
 class LoadedRobot(ABC):
-    """A URDF file as one engine loads it, with results in the coordinates of dynx.
+    """A file as one engine loads it, with results in the coordinates of dynx.
 
     `model` defines the coordinates: its base, its gravity, its links and its moving joints (mimic joints have
     to be set free in it). It gives names and order only; what the engine loaded is not corrected by it.
@@ -91,6 +93,9 @@ class LoadedRobot(ABC):
     name: ClassVar[str]
     """Name of the engine: ``pinocchio``, ``pybullet``, ``mujoco``, ``drake``; of a loading variant, another
     documented call of an engine, ``ENGINE:VARIANT``, such as ``pybullet:plain``."""
+
+    FORMATS: ClassVar[tuple[Format, ...]] = ("urdf",)
+    """Formats of the files that the engine, as it is installed, loads by itself."""
 
     CALLS: ClassVar[Mapping[str, str]] = {}
     """Engine settings that are remedies at run time: id -> the line of code a user would write."""
@@ -120,10 +125,11 @@ class LoadedRobot(ABC):
 
     @classmethod
     @abstractmethod
-    def load_call(cls, floating: bool, root: str | None = None) -> str:
+    def load_call(cls, floating: bool, root: str | None = None, form: Format = "urdf") -> str:
         """Return the documented call that loads a file, as the line or lines of code that users write.
 
-        `root` is the name of the root link, on which the call may depend.
+        `root` is the name of the root link, on which the call may depend, `form` the format of the file: MJCF
+        and SDF state themselves whether the base floats.
         """
 
     @abstractmethod
@@ -187,6 +193,31 @@ def require_file(path: Path) -> None:
     """Raise EngineError for anything but a regular file: engines crash on a folder and hang on a pipe."""
     if not os.path.isfile(path):
         raise EngineError(f"no regular file to load: {shown(path, 300)}")
+
+
+_NAMES = {"urdf": "URDF", "mjcf": "MJCF", "sdf": "SDF"}
+
+
+def format_name(form: Format) -> str:
+    """Return the name of a format, as sentences have it."""
+    return _NAMES[form]
+
+
+def checked_format(kind: type[LoadedRobot], path: Path) -> Format:
+    """Return the format of a file.
+
+    Raises EngineError for no file or no XML, UnusableEngineError for a format that the engine does not load.
+    """
+    require_file(path)
+    if path.suffix.lower() == ".urdf":
+        return "urdf"
+    try:
+        form = format_of_root(XmlSource(path.read_bytes(), str(path)).root.tag)
+    except DescriptionError as error:
+        raise EngineError(f"{kind.name} cannot load a file that is not XML: {error}") from error
+    if form not in kind.FORMATS:
+        raise UnusableEngineError(f"{kind.name}, as it is installed, loads no {format_name(form)}")
+    return form
 
 
 def lacking_joints(engine: str, model: Model, instead: Mapping[str, str]) -> UnusableEngineError:

@@ -12,7 +12,7 @@ from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.elements import Inertial, Vector
 from dynx.model.loading import read_model
-from dynx.model.tree import STANDARD_GRAVITY, Base
+from dynx.model.tree import STANDARD_GRAVITY, Base, Format, format_of_root
 from dynx.model.xml.source import SourceElement, XmlSource
 
 
@@ -20,7 +20,8 @@ from dynx.model.xml.source import SourceElement, XmlSource
 class Case:
     """The document `source`, examined on `base`, with the engine settings (`calls`) applied so far.
 
-    `choices` are the user's choices where a remedy has several, by rule id (see `Rule.choices`).
+    `choices` are the user's choices where a remedy has several, by rule id (see `Rule.choices`). A document
+    in MJCF or SDF states its own gravity, and its base, which `base` has to be.
     """
 
     source: XmlSource
@@ -30,11 +31,17 @@ class Case:
     choices: Mapping[str, str] | None = None
 
     @cached_property
+    def form(self) -> Format:
+        """Format of the document."""
+        return format_of_root(self.source.root.tag)
+
+    @cached_property
     def reading(self) -> Model | DynxError:
         """The result of `dynx.load` on the document: a model, or the error."""
         text = self.source.text_with_lines_before
         try:
-            return read_model(text, self.source.source, base=self.base, gravity=self.gravity)
+            gravity = self.gravity if self.form == "urdf" else None
+            return read_model(text, self.source.source, base=self.base, gravity=gravity)
         except DynxError as error:
             return error
 

@@ -16,7 +16,7 @@ from packaging.specifiers import SpecifierSet
 from dynx.argument_types import checks_types
 from dynx.loaded import engine_of
 from dynx.loaded.robot import call_on_joint
-from dynx.model.tree import Base
+from dynx.model.tree import Base, Format
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules.case import Case
 
@@ -104,7 +104,7 @@ class Rule(ABC):
 
     id: ClassVar[str]
     """``DX`` and three digits, of which the first is the subject: 1 inertia, 2 joints, 3 joint dynamics,
-    4 text, 5 practice. Rules of other packages have a prefix of their own."""
+    4 text, 5 practice, 6 MJCF, 7 SDF. Rules of other packages have a prefix of their own."""
 
     name: ClassVar[str]
     """Words joined by hyphens, such as ``link-without-inertial``."""
@@ -112,6 +112,9 @@ class Rule(ABC):
     title: ClassVar[str]
     """The cause in one sentence. Like `advice` and `choices`, it names an engine only where the rule concerns
     this one alone: a user may have asked for others."""
+
+    formats: ClassVar[tuple[Format, ...]] = ("urdf",)
+    """Formats of the files in which the rule looks for its cause; the trap is of the first."""
 
     kind: ClassVar[Kind] = "difference"
     stage: ClassVar[Stage] = "model"
@@ -121,6 +124,15 @@ class Rule(ABC):
     ``>=3.2.5,<=3.2.7``) in which that was measured; a test loads the trap in the installed version and
     fails if the engine behaves otherwise. An engine stands for its loading variants too; a variant
     (``pybullet:plain``) is named where it alone is meant."""
+
+    stated: ClassVar[bool] = False
+    """True if neither an edit nor a call removes the cause: an importer leaves something out. Its effect
+    is then what remains of the difference in the engines that the rule names, without all other causes,
+    and is not proved; a test shows it on the trap, beside the same file without the cause.
+    """
+
+    stated_bound: ClassVar[float] = float("inf")
+    """Largest error that a `stated` cause accounts for."""
 
     undefined: ClassVar[str] = ""
     """Name of what the file leaves undefined where the cause is present, such as ``dynamics``; mostly empty.
@@ -163,7 +175,7 @@ class Rule(ABC):
 
     def detect(self, case: Case) -> Sequence[Detection]:
         """Return every place that still has to be remedied, in document order."""
-        return list(self.occurrences(case))
+        return list(self.occurrences(case)) if case.form in self.formats else []
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """Return the case without the cause in these places; None where nothing can remove it."""
@@ -208,7 +220,8 @@ class Rule(ABC):
     def trap(cls) -> str:
         """Return the name of the file that shows the cause alone, in ``models/traps`` or beside the rule's
         module."""
-        return f"{cls.id.lower()}_{cls.name.replace('-', '_')}.urdf"
+        suffix = {"urdf": "urdf", "mjcf": "xml", "sdf": "sdf"}[cls.formats[0]]
+        return f"{cls.id.lower()}_{cls.name.replace('-', '_')}.{suffix}"
 
 
 class CallingRule(Rule):

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dynx.doctor.examination import temporary_urdf
+from dynx.doctor.examination import temporary_document
 from dynx.engines.silence import silence
 from dynx.loaded import installed_engines, load_as, loader_class
 from dynx.rules import Case, find_rule
@@ -52,7 +52,7 @@ def arm(written_ends: str, type: str = "revolute") -> Case:
 @pytest.mark.parametrize("ends", HELD)
 def test_the_range_that_an_engine_holds(ends: str, type: str, engine: str) -> None:
     case = arm(ends, type)
-    with temporary_urdf(case.source) as path, silence(), load_as(engine, path, case.model) as robot:
+    with temporary_document(case.source) as path, silence(), load_as(engine, path, case.model) as robot:
         held = robot.describe().joints["elbow"].limits
     assert held == HELD[ends][engine], loader_class(engine).engine_version()
 
@@ -65,7 +65,7 @@ def test_pybullet_stops_a_joint_on_its_way_up_until_the_file_is_mended(mend: boo
         case = mended("DX216", case)[1].case
     client = p.connect(p.DIRECT)
     try:
-        with temporary_urdf(case.source) as path, silence():
+        with temporary_document(case.source) as path, silence():
             body = p.loadURDF(str(path), useFixedBase=True, physicsClientId=client)
         names = [
             p.getJointInfo(body, k, physicsClientId=client)[1] for k in range(p.getNumJoints(body, client))

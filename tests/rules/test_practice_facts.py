@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from dynx.doctor.examination import model_without_mimics, temporary_urdf, without_meshes
+from dynx.doctor.examination import model_without_mimics, temporary_document, without_meshes
 from dynx.engines.silence import silence
 from dynx.loaded import LoadedJoint, installed_engines, load_as, loader_class
 from dynx.rules.registry import find_trap, trap_case
@@ -29,7 +29,7 @@ def loaded_elbow(rule: str, engine: str) -> LoadedJoint:
     case = trap_case(rule)
     model = model_without_mimics(case.source, case.base)
     with (
-        temporary_urdf(without_meshes(case.source)) as path,
+        temporary_document(without_meshes(case.source)) as path,
         silence(),
         load_as(engine, path, model) as robot,
     ):
@@ -69,7 +69,7 @@ def test_equal_limits_that_are_written(engine: str, limits: tuple[float, float])
         pytest.skip(f"{engine} is not installed")
     equal = '<limit lower="0.5" upper="0.5" effort="1" velocity="1"/>'
     case = case_of(link("base"), link("arm"), joint("elbow", "base", "arm", limit=equal))
-    with temporary_urdf(case.source) as path, silence(), load_as(engine, path, case.model) as robot:
+    with temporary_document(case.source) as path, silence(), load_as(engine, path, case.model) as robot:
         assert robot.describe().joints["elbow"].limits == limits
 
 

@@ -94,9 +94,8 @@ def _rules_option(option: str, subject: str) -> Callable[[F], F]:
 @click.option(
     "--base",
     type=click.Choice(["fixed", "floating", "both"]),
-    default="fixed",
-    show_default=True,
-    help="Mount of the root link: fixed to the world, floating (free to move), or each in turn with `both`.",
+    help="Mount of the root link: fixed to the world, floating (free to move), or each in turn with `both`; "
+    "by default that of an MJCF or SDF file, else fixed.",
 )
 @engine_option(
     "engines",
@@ -171,8 +170,9 @@ def _rules_option(option: str, subject: str) -> Callable[[F], F]:
 def doctor() -> None:
     """Find out why engines differ on a file: load it with each, prove every cause, and mend the file.
 
-    ROBOT is a name (see `dynx robots`), a URDF file, a directory (every .urdf below it), or `all`:
-    every robot of example-robot-data. For one robot the full report is printed, for several a line each.
+    ROBOT is a name (see `dynx robots`), a URDF, MJCF or SDF file, a directory (every .urdf below it), or
+    `all`: every robot of example-robot-data. For one robot the full report is printed, for several a line
+    each.
 
     Each cause is proved by removing it alone from the file and measuring the engines again. The file
     that was read is changed only with --in-place. Other files named as outputs are replaced where they exist.
@@ -188,6 +188,7 @@ def doctor() -> None:
     Examples:
       dynx doctor ur5
       dynx doctor my.urdf --fix mended.urdf
+      dynx doctor my.xml --engine mujoco,pinocchio
       dynx doctor robots/ --base both --html report.html --jobs 4
       dynx doctor my.urdf --ignore DX301,inertia-not-diagonal
       dynx doctor robots/ --tolerance 1e-6 --baseline known.json --sarif out.sarif

@@ -286,5 +286,7 @@ def _name(each: RobotInput) -> str:
     if each.folder is not None:
         return os.path.relpath(each.robot, each.folder)
     name = PurePath(split_arguments(each.robot)[0]).name
+    if PurePath(name).suffix in (".xml", ".mjcf", ".sdf", ".world"):
+        return name
     stem = name.removesuffix(".xacro").removesuffix(".urdf")
     return f"{stem or 'robot'}.urdf"

@@ -28,7 +28,7 @@ from dynx.rules.rule import Level
 
 def doctor(
     robots: tuple[str, ...],
-    base: Literal["fixed", "floating", "both"],
+    base: Literal["fixed", "floating", "both"] | None,
     engines: tuple[str, ...] | None,
     samples: int | None,
     seed: int,
@@ -60,7 +60,7 @@ def doctor(
     baseline = None if baseline_path is None else load_baseline(baseline_path)
     found = expand(robots)
     inputs = found.robots
-    bases: tuple[Base, ...] = ("fixed", "floating") if base == "both" else (base,)
+    bases: tuple[Base | None, ...] = ("fixed", "floating") if base == "both" else (base,)
     targets = planned_targets(inputs, fix, in_place=in_place, bases=bases)
     outputs.keep_apart((each.robot for each in inputs), () if in_place else targets, baseline_path)
     examined = [(each, one) for each in inputs for one in bases]
@@ -260,7 +260,7 @@ def doctor_command(task: DoctorTask) -> str:
         "doctor",
         robot if robot.isprintable() and len(robot) <= _MAX_PATH else short_line(robot),
     ]
-    if task.base != "fixed":
+    if task.base not in (None, "fixed"):
         words += ["--base", task.base]
     if task.engines is not None:
         words += ["--engine", ",".join(task.engines)]

@@ -25,6 +25,7 @@ from dynx.doctor.formats.causes import (
     severity,
 )
 from dynx.doctor.report import DoctorReport, EngineResult, Finding, Status
+from dynx.loaded.difference import Deviation
 from dynx.rules import CallingRule
 
 _PLACES = (4, 3, 2, 1)
@@ -73,6 +74,7 @@ def _show(
     show_errors(out, report)
     show_variants(out, report)
     _show_findings(out, [each for each in causes(report) if each.rule not in report.ignored], places)
+    show_model_difference(out, report)
     if report.ignored:
         out.print()
         show_ignored(out, report)
@@ -148,6 +150,26 @@ def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> N
         limit = f"{ROUNDING:.0e}"
         kept = f"the mended file keeps errors of up to {limit} (shortened numbers, causes of less effect)"
         sentence(out, f"{kept}: check it with --tolerance {limit}", 1, "dim")
+
+
+def show_model_difference(out: Console, report: DoctorReport) -> None:
+    """Print in which parts the models of the engines differ from a file in MJCF or SDF, with a line for each
+    property of an engine."""
+    found: dict[tuple[str, str, str], list[Deviation]] = {}
+    for each in report.model_difference if report.format != "urdf" else ():
+        # No file in SDF or MJCF states the gravity of PyBullet's world.
+        if (each.engine, each.part) != ("pybullet", "gravity"):
+            found.setdefault((each.engine, each.part, each.property), []).append(each)
+    if not found:
+        return
+    heading(out, "what engines hold otherwise than the file states")
+    for (engine, part, quality), places in found.items():
+        first = places[0]
+        line = "" if first.line is None else f"line {first.line}: "
+        more = f"; and of {len(places) - 1} more" if len(places) > 1 else ""
+        who = "" if part in ("base", "gravity") else f" of {part} {wording.name(first.name)}"
+        values = f"{wording.value(first.file)} -> {wording.value(first.engine_value)}"
+        sentence(out, f"{engine}: {line}{quality}{who} {values}{more}", 2, "dim")
 
 
 def show_variants(out: Console, report: DoctorReport) -> None:
@@ -282,7 +304,8 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None, command: 
         if by_hand := _by_hand(report):
             sentence(out, f"not mended, because the file does not say what is right: {by_hand}", 0, "yellow")
     elif report.mended is not None:
-        out.print(f"to mend it: {command} --fix OUT.urdf", style="bold")
+        suffix = {"urdf": ".urdf", "mjcf": ".xml", "sdf": ".sdf"}[report.format]
+        out.print(f"to mend it: {command} --fix OUT{suffix}", style="bold")
     if not report.alike:
         out.print(f"{_residual(report)}; {report.seconds:.1f} s", style="dim")
 

@@ -290,3 +290,14 @@ def _value(value: Any, digits: int) -> str:
         )
         return f"[{inside}]"
     return "0" if value == 0 else f"{value:.{digits}g}"
+
+
+def value(given: Any) -> str:
+    """Write a value of a model: a number, numbers, a word, or that there is none."""
+    if given is None:
+        return "none"
+    if isinstance(given, bool):
+        return "there" if given else "not there"
+    if isinstance(given, list | tuple):
+        return f"[{', '.join(map(value, given))}]"
+    return f"{given:.6g}" if isinstance(given, int | float) else name(str(given))

@@ -1,4 +1,4 @@
-"""A URDF file as Drake loads it: ``Parser(plant).AddModels(path)`` into a `MultibodyPlant`.
+"""A file in URDF, MJCF or SDF as Drake loads it: ``Parser(plant).AddModels(path)`` into a `MultibodyPlant`.
 
 The plant is continuous (``time_step=0.0``) and has no scene graph, because the equations of motion are
 compared and a discrete plant returns a step of its contact solver. Inverse dynamics is called as Drake's own
@@ -45,11 +45,13 @@ from dynx.loaded.robot import (
     LoadedModel,
     LoadedRobot,
     called_joints,
+    checked_format,
     lacking_joints,
     require_file,
 )
 from dynx.model import Model
 from dynx.model.mechanism import float64, pose_arrays
+from dynx.model.tree import Format
 from dynx.model.xml.source import SourceElement, XmlSource
 from dynx.spatial.inertia import inertia_about_origin
 from dynx.spatial.scalar import Floats
@@ -87,8 +89,8 @@ def set_before_finalize(plant: Any, joints: Mapping[str, Any], path: Path, calls
         joint = plant.get_mutable_joint(joints[name].index())
         joint.set_default_damping_vector(0.0 * joint.default_damping_vector())
     constraints = plant.GetConstraintIds()
-    if "drake.free_mimics" in calls:
-        freed = constraints
+    if "drake.free_mimics" in calls or path.suffix != ".urdf":
+        freed = constraints if "drake.free_mimics" in calls else []
     else:
         # Drake numbers them in document order and does not name their joints.
         followers = _followers(path) if constraints else []
@@ -138,9 +140,15 @@ def describe_link(body: Any, context: Any) -> LoadedInertial:
     return LoadedInertial(mass, center, central)
 
 
-def describe_joint(joint: Any, actuator: Any | None) -> LoadedJoint:
-    """Return the description of a joint that moves; effort and armature are those of its actuator, if any."""
-    placement = np.array(joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4())
+def describe_joint(joint: Any, actuator: Any | None, form: Format = "urdf") -> LoadedJoint:
+    """Return the description of a joint that moves; effort and armature are those of its actuator, if any.
+
+    A joint of SDF has a frame of its own, so that its axis is given in the frame of the child, and its place
+    shows in the poses of links alone.
+    """
+    placement, R_child = np.array(joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4()), np.eye(3)
+    if form == "sdf":
+        placement, R_child = None, joint.frame_on_child().GetFixedPoseInBodyFrame().rotation().matrix()
     kind = str(joint.type_name())
     if joint.num_velocities() != 1:
         return LoadedJoint(kind, placement)
@@ -150,7 +158,7 @@ def describe_joint(joint: Any, actuator: Any | None) -> LoadedJoint:
     return LoadedJoint(
         type="continuous" if unbounded else kind,
         placement=placement,
-        axis=np.array(joint.translation_axis() if prismatic else joint.revolute_axis()),
+        axis=R_child @ np.array(joint.translation_axis() if prismatic else joint.revolute_axis()),
         limits=(lower, upper),
         velocity=float(joint.velocity_upper_limits()[0]),
         effort=None if actuator is None else float(actuator.effort_limit()),
@@ -164,7 +172,7 @@ def remarks(log: Iterable[str], path: str, plant: Any) -> tuple[str, ...]:
     """Return Drake's log messages, each once and on one line, and the number of constraints that it made."""
     lines = [" ".join(message.replace(f"{path}:", "line ").split()) for message in log]
     if plant.num_constraints():
-        lines.append(f"{plant.num_constraints()} mimic joints are constraints")
+        lines.append(f"{plant.num_constraints()} couplings of joints are constraints")
     return tuple(dict.fromkeys(lines))
 
 
@@ -264,13 +272,16 @@ class LoadedDrake(LoadedRobot):
     """A robot as Drake loads it; see `LoadedRobot` and the module docstring."""
 
     name: ClassVar[str] = "drake"
+    FORMATS: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf", "sdf")
     CALLS: ClassVar[Mapping[str, str]] = CALLS
 
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
-        require_harmless(path, model)
+        self._form = checked_format(type(self), path)
+        if self._form == "urdf":
+            require_harmless(path, model)
         self._model = model
         # The lines shown to users are those that are executed.
-        create, read, *weld, finalize = self.load_call(model.floating, model.root).splitlines()
+        create, read, *weld, finalize = self.load_call(model.floating, model.root, self._form).splitlines()
         names = {
             "MultibodyPlant": MultibodyPlant,
             "Parser": Parser,
@@ -279,10 +290,10 @@ class LoadedDrake(LoadedRobot):
         }
         exec(create, names)
         self._plant = plant = names["plant"]
-        self._default_gravity: Floats = np.array(plant.gravity_field().gravity_vector())
         with self._convert_errors("load"), captured_log() as log:
             exec(read, names)
             instances = [ModelInstanceIndex(k) for k in range(_OWN_INSTANCES, plant.num_model_instances())]
+            self._default_gravity: Floats = np.array(plant.gravity_field().gravity_vector())
             plant.mutable_gravity_field().set_gravity_vector(np.array(model.gravity))
             self._bodies = self._find_bodies(instances)
             if model.root not in self._bodies:
@@ -306,10 +317,11 @@ class LoadedDrake(LoadedRobot):
 
     @classmethod
     @checks_types
-    def load_call(cls, floating: bool, root: str | None = None) -> str:
-        """Return the call: four lines for a fixed base. The line with ``WeldFrames`` is omitted for a
-        floating one, and for a root named ``world``, which is Drake's world itself."""
-        weld = "" if floating or root == _WORLD else f"{_WELD}\n"
+    def load_call(cls, floating: bool, root: str | None = None, form: Format = "urdf") -> str:
+        """Return the call: four lines for a fixed base in URDF. The line with ``WeldFrames`` is omitted for a
+        floating one, for a root named ``world``, which is Drake's world itself, and for other formats, which
+        state what is fixed to the world."""
+        weld = "" if floating or root == _WORLD or form != "urdf" else f"{_WELD}\n"
         return f"plant = MultibodyPlant(time_step=0.0)\nParser(plant).AddModels(path)\n{weld}plant.Finalize()"
 
     # -- quantities ------------------------------------------------------------------------------
@@ -381,7 +393,7 @@ class LoadedDrake(LoadedRobot):
         rotors = {}
         for index in self._plant.GetJointActuatorIndices():
             actuator = self._plant.get_joint_actuator(index)
-            rotors[actuator.joint().name()] = actuator
+            rotors[self._scoped(actuator.joint())] = actuator
         names = [link.name for link in self._model.links]
         return LoadedModel(
             engine=self.name,
@@ -391,11 +403,13 @@ class LoadedDrake(LoadedRobot):
                 if name in self._bodies
             },
             joints={
-                name: describe_joint(joint, rotors.get(name))
+                name: describe_joint(joint, rotors.get(name), self._form)
                 for name, joint in self._joints.items()
                 if joint.num_velocities()
             },
-            base_frame=self.link_poses(self._model.neutral())[0],
+            base_frame=np.eye(4)
+            if self._model.floating and self._form != "urdf"
+            else self.link_poses(self._model.neutral())[0],
             gravity=self._default_gravity,
             missing_links=tuple(name for name in names if name not in self._bodies),
             remarks=self._remarks,
@@ -406,7 +420,7 @@ class LoadedDrake(LoadedRobot):
     def _find_bodies(self, instances: list[Any]) -> dict[str, Any]:
         plant = self._plant
         found = {
-            plant.get_body(index).name(): plant.get_body(index)
+            self._scoped(plant.get_body(index)): plant.get_body(index)
             for instance in instances
             for index in plant.GetBodyIndices(instance)
         }
@@ -421,7 +435,15 @@ class LoadedDrake(LoadedRobot):
         joints = [
             plant.get_joint(index) for instance in instances for index in plant.GetJointIndices(instance)
         ]
-        return {joint.name(): joint for joint in joints if joint.name() in known}
+        named = {self._scoped(joint): joint for joint in joints}
+        return {name: joint for name, joint in named.items() if name in known}
+
+    def _scoped(self, part: Any) -> str:
+        """Return the name of a body or joint as dynx has it: below that of the nested model of SDF."""
+        if self._form != "sdf":
+            return str(part.name())
+        _, _, nested = str(self._plant.GetModelInstanceName(part.model_instance())).partition("::")
+        return f"{nested}::{part.name()}" if nested else str(part.name())
 
     def _find_coordinates(self) -> DrakeCoordinates:
         """Return the map between the coordinates of dynx and those of the plant."""

@@ -1,4 +1,4 @@
-"""A URDF file as MuJoCo loads it.
+"""A file in URDF or MJCF as MuJoCo loads it.
 
 Quantities are those of the calls that users make, `mj_inverse` and `mj_forward`, with all forces that MuJoCo
 adds to rigid bodies. Joint damping, dry friction, violated limits, `<mimic>` (an equality constraint) and
@@ -6,6 +6,9 @@ shapes that touch add forces to both; each of `CALLS` removes one kind.
 
 With a fixed base MuJoCo merges the root link, and all links on fixed joints, into their parents
 (`fusestatic`, the default for URDF), so these links have no frame.
+
+MJCF is MuJoCo's own format: its bodies and joints without a name are found by their numbers, as
+`dynx.model.mjcf` names them.
 """
 
 from __future__ import annotations
@@ -29,10 +32,12 @@ from dynx.loaded.robot import (
     LoadedModel,
     LoadedRobot,
     called_joints,
+    checked_format,
     lacking_joints,
     require_file,
 )
 from dynx.model import Model
+from dynx.model.tree import Format
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
@@ -42,6 +47,15 @@ CALLS: Mapping[str, str] = {
     "mujoco.no_friction": "model.dof_frictionloss[:] = 0",
     "mujoco.no_limits": "model.jnt_limited[:] = 0",
     "mujoco.no_mimic": "model.eq_active0[:] = 0",
+    "mujoco.no_armature": "model.dof_armature[:] = 0",
+    "mujoco.no_springs": "model.jnt_stiffness[:] = 0",
+    "mujoco.no_gravity_compensation": "model.body_gravcomp[:] = 0",
+    "mujoco.no_tendons": (
+        "model.tendon_stiffness[:] = model.tendon_damping[:] = model.tendon_frictionloss[:] = 0\n"
+        "model.tendon_armature[:] = model.tendon_limited[:] = 0"
+    ),
+    "mujoco.no_actuators": "model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION",
+    "mujoco.no_fluid": "model.opt.density = model.opt.viscosity = 0; model.opt.wind[:] = 0",
     "mujoco.exact_inertial_frames": (
         "model.body_sameframe[:] = model.body_simple[:] = model.dof_simplenum[:] = 0"
     ),
@@ -69,13 +83,32 @@ def load_file(path: Path, model: Model, loading: str, calls: Collection[str]) ->
         raise EngineError(f"mujoco refuses {path.name}: {_message(error)}") from error
     loaded = names["model"]
     if model.floating:
-        name = loaded.body(int(loaded.jnt_bodyid[0])).name if loaded.njnt else "nothing"
+        bodies = {number: name for name, number in body_numbers(loaded).items()}
+        name = bodies[int(loaded.jnt_bodyid[0])] if loaded.njnt else "nothing"
         if name != model.root:
             raise UnusableEngineError(
                 f"mujoco lets {shown(name)} float instead of the root {shown(model.root)} of {path.name}"
                 + (": MuJoCo mistakes a root named 'world' for the world" if model.root == "world" else "")
             )
     return loaded
+
+
+def body_numbers(loaded: Any) -> dict[str, int]:
+    """Return the numbers of the bodies by name; one without a name is called as dynx calls it."""
+    names = ((loaded.body(number).name or f"body_{number}", number) for number in range(1, loaded.nbody))
+    return dict(names)
+
+
+def joint_numbers(loaded: Any) -> dict[str, int]:
+    """Return the numbers of the joints by name; one without a name is called as dynx calls it."""
+    bodies = {number: name for name, number in body_numbers(loaded).items()}
+    numbers = {}
+    for joint in range(loaded.njnt):
+        body = int(loaded.jnt_bodyid[joint])
+        first, count = int(loaded.body_jntadr[body]), int(loaded.body_jntnum[body])
+        suffix = "" if count == 1 else f"_{joint - first + 1}"
+        numbers[loaded.joint(joint).name or f"{bodies[body]}_joint{suffix}"] = joint
+    return numbers
 
 
 def loading_lines(*, floating: bool, options: str = "") -> str:
@@ -88,7 +121,7 @@ def loading_lines(*, floating: bool, options: str = "") -> str:
 
 def _set_joints(loaded: Any, calls: Collection[str]) -> None:
     """Apply those of `calls` that are made on single joints."""
-    joints = {loaded.joint(k).name: k for k in range(loaded.njnt)}
+    joints = joint_numbers(loaded)
     for call, change in _ON_JOINT.items():
         if call not in calls:
             for name in called_joints(calls, call, joints):
@@ -109,6 +142,14 @@ def _disable_friction(loaded: Any, joint: int) -> None:
     loaded.dof_frictionloss[loaded.jnt_dofadr[joint]] = 0
 
 
+def _disable_armature(loaded: Any, joint: int) -> None:
+    loaded.dof_armature[loaded.jnt_dofadr[joint]] = 0
+
+
+def _disable_spring(loaded: Any, joint: int) -> None:
+    loaded.jnt_stiffness[joint] = 0
+
+
 def _disable_limits(loaded: Any, joint: int) -> None:
     loaded.jnt_limited[joint] = 0
 
@@ -118,6 +159,8 @@ _ON_JOINT: Mapping[str, Callable[[Any, int], None]] = {
     "mujoco.no_friction": _disable_friction,
     "mujoco.no_limits": _disable_limits,
     "mujoco.no_mimic": _free_follower,
+    "mujoco.no_armature": _disable_armature,
+    "mujoco.no_springs": _disable_spring,
 }
 """The calls of `CALLS` that can be made on one joint, by its number."""
 
@@ -168,9 +211,9 @@ NAMES = {
 }
 
 
-def describe_model(loaded: Any, model: Model, gravity: Floats) -> LoadedModel:
+def describe_model(loaded: Any, model: Model, gravity: Floats, form: Format = "urdf") -> LoadedModel:
     """Describe a MuJoCo model `loaded` from a file with the names of `model`."""
-    here = {loaded.body(number).name: number for number in range(1, loaded.nbody)}
+    here = body_numbers(loaded)
     merged = _merged_links(model, here)
     links = {
         link.name: _inertial(loaded, here[link.name], merged.get(link.name, ()))
@@ -178,11 +221,12 @@ def describe_model(loaded: Any, model: Model, gravity: Floats) -> LoadedModel:
         if link.name in here
     }
     first = int(model.floating)
-    joints = {loaded.jnt(k).name: _joint(loaded, k, model, here) for k in range(first, loaded.njnt)}
+    numbered = joint_numbers(loaded).items()
+    joints = {name: _joint(loaded, k, model, here) for name, k in numbered if k >= first}
     remarks = []
-    if model.root not in here:
+    if model.root not in here and form == "urdf":
         remarks.append(f"the root link {model.root} is merged into the world")
-    if loaded.neq:
+    if loaded.neq and form == "urdf":
         remarks.append(f"{loaded.neq} equality constraints stand for <mimic>")
     if np.any(loaded.geom_contype[:] * loaded.geom_conaffinity[:]):
         remarks.append(f"{loaded.ngeom} collision shapes can touch each other")
@@ -192,7 +236,7 @@ def describe_model(loaded: Any, model: Model, gravity: Floats) -> LoadedModel:
         joints=joints,
         # MuJoCo puts the root link at the origin of the world, even if it merges it.
         base_frame=_pose(loaded.body_pos[here[model.root]], loaded.body_quat[here[model.root]])
-        if model.root in here
+        if model.root in here and not (form == "mjcf" and model.floating)
         else np.eye(4),
         gravity=gravity,
         missing_links=tuple(link.name for link in model.links if link.name not in here),
@@ -242,9 +286,11 @@ def _joint(loaded: Any, number: int, model: Model, here: dict[str, int]) -> Load
 
 def _placement(loaded: Any, body: int, model: Model, here: dict[str, int]) -> Floats | None:
     """Return the pose of a body in its parent link; None where MuJoCo has merged that link."""
-    child = loaded.body(body).name
+    child = next((name for name, number in here.items() if number == body), "")
     parents = [joint.parent for joint in model.joints if joint.child == child]
-    if not parents:
+    first = int(loaded.body_jntadr[body])
+    if not parents or (first >= 0 and loaded.qpos0[loaded.jnt_qposadr[first]]):
+        # MuJoCo holds the pose of the body in the pose of the file, at which the joint may not be at 0.
         return None
     parent = int(loaded.body_parentid[body])
     # A root link that became the world keeps its frame.
@@ -265,12 +311,16 @@ class LoadedMujoco(LoadedRobot):
     """A robot as `mujoco.MjModel.from_xml_path` loads it; see `LoadedRobot`."""
 
     name: ClassVar[str] = "mujoco"
+    FORMATS: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")
     CALLS: ClassVar[Mapping[str, str]] = CALLS
     refuses_without: ClassVar[tuple[str, ...]] = ("collision",)
 
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
         self._model = model
-        self._loaded = loaded = load_file(Path(path), model, self.load_call(model.floating), calls)
+        self._form = checked_format(type(self), Path(path))
+        call = self.load_call(model.floating, model.root, self._form)
+        self._loaded = loaded = load_file(Path(path), model, call, calls)
+        self._numbers = body_numbers(loaded), joint_numbers(loaded)
         self._gravity: Floats = np.array(loaded.opt.gravity)
         loaded.opt.gravity[:] = model.gravity
         self._bodies = [self._body(link.name) for link in model.links]
@@ -288,13 +338,13 @@ class LoadedMujoco(LoadedRobot):
 
     @classmethod
     @checks_types
-    def load_call(cls, floating: bool, root: str | None = None) -> str:
-        """Return the call: one line for a fixed base, three for a floating one."""
-        return loading_lines(floating=floating)
+    def load_call(cls, floating: bool, root: str | None = None, form: Format = "urdf") -> str:
+        """Return the call: one line for MJCF and for a fixed base, three for a floating one."""
+        return loading_lines(floating=floating and form == "urdf")
 
     def describe(self) -> LoadedModel:
         """Describe MuJoCo's model."""
-        return replace(describe_model(self._loaded, self._model, self._gravity), engine=self.name)
+        return replace(describe_model(self._loaded, self._model, self._gravity, self._form), engine=self.name)
 
     def link_poses(self, q: Floats) -> Floats:
         """Return T_world_link (n_links, 4, 4); NaN for links that MuJoCo merged into others."""
@@ -419,12 +469,13 @@ class LoadedMujoco(LoadedRobot):
         """Return MuJoCo's body for a link; the world for a fixed root named ``world``."""
         if not link:
             return None
-        number = int(mujoco.mj_name2id(self._loaded, mujoco.mjtObj.mjOBJ_BODY, link))
+        # A link named `world` may be MuJoCo's world, which has the number 0.
+        number = self._numbers[0].get(link, WORLD if link == "world" else -1)
         is_world = number == WORLD and link == self._model.root and not self._model.floating
         return number if number > WORLD or is_world else None
 
     def _joint(self, name: str) -> int:
-        number = int(mujoco.mj_name2id(self._loaded, mujoco.mjtObj.mjOBJ_JOINT, name))
+        number = self._numbers[1].get(name, -1)
         single = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
         if number < 0 or self._loaded.jnt_type[number] not in [int(kind) for kind in single]:
             instead = "not there" if number < 0 else "of several degrees of freedom"
@@ -439,9 +490,10 @@ class BalancedMujoco(LoadedMujoco):
     """
 
     name: ClassVar[str] = "mujoco:balanceinertia"
+    FORMATS: ClassVar[tuple[Format, ...]] = ("urdf",)
 
     @classmethod
     @checks_types
-    def load_call(cls, floating: bool, root: str | None = None) -> str:
+    def load_call(cls, floating: bool, root: str | None = None, form: Format = "urdf") -> str:
         """Return the call: three lines for a fixed base, four for a floating one."""
         return loading_lines(floating=floating, options="spec.compiler.balanceinertia = True")

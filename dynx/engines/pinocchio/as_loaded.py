@@ -1,14 +1,16 @@
-"""A URDF file as Pinocchio loads it: ``pin.buildModelFromUrdf`` and nothing more.
+"""A file as Pinocchio loads it: ``pin.buildModelFromUrdf`` or ``pin.buildModelFromMJCF`` and nothing more.
 
-Pinocchio has its own order of joints, has two numbers (cos, sin) for a continuous joint, and makes joints of
-several degrees of freedom where the file has them. Here its coordinates are converted to those of dynx by the
-names of the joints.
+Pinocchio has its own order of joints, has two numbers (cos, sin) for a continuous joint, and makes joints
+of several degrees of freedom where the file has them. Here its coordinates are converted to those of dynx
+by the names of the joints. Of MJCF, Pinocchio joins the joints of one body to a composite joint, whose
+members have no names: they are found by their order in the body.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -24,28 +26,58 @@ from dynx.loaded.robot import (
     LoadedJoint,
     LoadedModel,
     LoadedRobot,
+    checked_format,
     lacking_joints,
-    require_file,
 )
 from dynx.model import Model
+from dynx.model.tree import Format
 from dynx.spatial.scalar import Floats
 
+CALLS: Mapping[str, str] = {"pinocchio.no_armature": "model.armature[:] = 0"}
+"""Remedies at run time: id -> the line of code, which comes after loading."""
+
 _TYPES = {"FreeFlyer": "floating", "Planar": "planar", "Spherical": "spherical"}
+
+
+_COMPOSITE = "Composite_"
+
+
+@dataclass(frozen=True)
+class _Member:
+    """A joint of a composite joint: its kind, and where its numbers stand among those of the model."""
+
+    kind: str
+    idx_q: int
+    idx_v: int
+    nq: int
+    nv: int
+
+    def shortname(self) -> str:
+        """Return the kind as Pinocchio's joints do."""
+        return f"JointModel{self.kind}"
 
 
 class LoadedPinocchio(LoadedRobot):
     """A robot as Pinocchio loads it; see `LoadedRobot`."""
 
     name: ClassVar[str] = "pinocchio"
+    FORMATS: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")
+    CALLS: ClassVar[Mapping[str, str]] = CALLS
 
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
-        require_file(path)
+        self._form = checked_format(type(self), path)
         self._model = model
         root = [pin.JointModelFreeFlyer()] if model.floating else []
         messages: list[str] = []
-        with self._convert_errors("buildModelFromUrdf"):
+        read = "buildModelFromMJCF" if self._form == "mjcf" else "buildModelFromUrdf"
+        with self._convert_errors(read):
             with capture_output(messages):
-                self._engine = pin.buildModelFromUrdf(str(path), *root)
+                if self._form == "mjcf":
+                    self._engine = pin.buildModelFromMJCF(str(path))
+                else:
+                    self._engine = pin.buildModelFromUrdf(str(path), *root)
+            if "pinocchio.no_armature" in calls:
+                self._engine.armature[:] = 0
             if self._engine.nv > MAX_NV:
                 raise UnusableEngineError(
                     f"{model.name} has {self._engine.nv} degrees of freedom in pinocchio; at most {MAX_NV} "
@@ -56,6 +88,8 @@ class LoadedPinocchio(LoadedRobot):
         self._default_gravity: Floats = np.array(self._engine.gravity.linear)
         self._engine.gravity.linear = np.array(model.gravity)
         self._neutral: Floats = np.array(pin.neutral(self._engine))
+        if model.floating and (self._engine.njoints < 2 or self._engine.joints[1].nv != 6):
+            raise UnusableEngineError(f"pinocchio does not let the base of {model.name} float")
         self._joints = self._find_joints()
         self._links = {
             frame.name: number
@@ -73,8 +107,10 @@ class LoadedPinocchio(LoadedRobot):
 
     @classmethod
     @checks_types
-    def load_call(cls, floating: bool, root: str | None = None) -> str:
-        """Return the call: one line; the joint of a floating base is its second argument."""
+    def load_call(cls, floating: bool, root: str | None = None, form: Format = "urdf") -> str:
+        """Return the call: one line; for URDF the joint of a floating base is its second argument."""
+        if form == "mjcf":
+            return "model = pinocchio.buildModelFromMJCF(path)"
         root = ", pinocchio.JointModelFreeFlyer()" if floating else ""
         return f"model = pinocchio.buildModelFromUrdf(path{root})"
 
@@ -146,11 +182,16 @@ class LoadedPinocchio(LoadedRobot):
         """
         engine = self._engine
         base = self.link_poses(self._model.neutral())[0]
+        if self._model.root == "world" and "world" not in self._links:
+            # The world of MJCF is Pinocchio's universe.
+            base = np.eye(4)
         joints = {
             name: self._describe_joint(number)
             for number, name in enumerate(engine.names)
-            if number > (1 if self._model.floating else 0)
+            if number > (1 if self._model.floating else 0) and name not in self._composites
         }
+        for composite in self._composites.values():
+            joints |= {name: self._describe_member(member) for name, member in composite}
         return LoadedModel(
             engine=self.name,
             links=dict(self._inertials()),
@@ -176,6 +217,9 @@ class LoadedPinocchio(LoadedRobot):
                     for other, at in self._links.items()
                     if other != name and engine.frames[at].parentJoint == frame.parentJoint
                 )
+            if self._form == "mjcf" and own is not frame.inertia and above.type != pin.FrameType.FIXED_JOINT:
+                # A joint off the origin of its body has a frame of its own.
+                own = frame.placement.actInv(own)
             yield name, LoadedInertial(float(own.mass), np.array(own.lever), np.array(own.inertia), merged)
 
     def _describe_joint(self, number: int) -> LoadedJoint:
@@ -208,14 +252,58 @@ class LoadedPinocchio(LoadedRobot):
             armature=float(engine.armature[at]),
         )
 
+    def _describe_member(self, joint: _Member) -> LoadedJoint:
+        """Describe a joint of one body that has several."""
+        engine, at = self._engine, joint.idx_v
+        return LoadedJoint(
+            type="prismatic" if joint.kind.startswith("P") else "revolute",
+            limits=(
+                float(engine.lowerPositionLimit[joint.idx_q]),
+                float(engine.upperPositionLimit[joint.idx_q]),
+            ),
+            velocity=float(engine.velocityLimit[at]),
+            effort=float(engine.effortLimit[at]),
+            damping=float(engine.damping[at]),
+            friction=float(engine.friction[at]),
+            armature=float(engine.armature[at]),
+        )
+
     # -- coordinates --------------------------------------------------------------------------
+
+    def _find_composites(self) -> dict[str, list[tuple[str, _Member]]]:
+        """Return the members of each composite joint, by the names that the file gives them.
+
+        A composite is called by the first of the joints of its body, with a prefix.
+        """
+        model = self._model
+        after = {joint.parent: joint for joint in model.joints if joint.moves}
+        found: dict[str, list[tuple[str, _Member]]] = {}
+        for number, name in enumerate(self._engine.names):
+            joint = self._engine.joints[number]
+            first = name.removeprefix(_COMPOSITE)
+            if first == name or first not in model.joint_names or not joint.shortname().endswith("Composite"):
+                continue
+            members, q, v = [], int(joint.idx_q), int(joint.idx_v)
+            at = model.joint(first)
+            for each in joint.extract().joints:
+                kind = str(each.shortname()).removeprefix("JointModel")
+                members.append((at.name, _Member(kind, q, v, int(each.nq), int(each.nv))))
+                q, v = q + int(each.nq), v + int(each.nv)
+                following = after.get(at.child)
+                if following is None:
+                    break
+                at = following
+            found[name] = members
+        return found
 
     def _find_joints(self) -> list[Any]:
         """Return the engine's joint for each coordinate of dynx."""
+        self._composites = self._find_composites()
         known = {name: self._engine.joints[number] for number, name in enumerate(self._engine.names)}
+        known |= dict(member for members in self._composites.values() for member in members)
         names = self._model.joint_names
         wrong = {
-            name: str(known[name].shortname()) if name in known else "not there"
+            name: known[name].shortname() if name in known else "not there"
             for name in names
             if name not in known or known[name].nv != 1
         }

@@ -1,4 +1,4 @@
-"""A URDF file as PyBullet loads it, with the flag that makes it read the file's inertias.
+"""A file as PyBullet loads it: URDF with the flag that makes it read the file's inertias, MJCF, or SDF.
 
 Engine calls respect Bullet's conventions: its world is the inertial frame of the root (centre of mass,
 principal axes) for inverse dynamics, mass matrix and Jacobian of a floating base; columns are angular before
@@ -16,6 +16,10 @@ those of the inertial, through the centre of mass of the file, wherever the shap
 gets an inertia of almost zero.
 
 With the flag that merges links on fixed joints, Bullet sums their inertias about wrong axes.
+
+**Other formats.** ``loadMJCF`` and ``loadSDF`` load every body of a file. The one with the joints of the
+model is examined. Bullet calls the root of an MJCF file by a name of its own; where that is fixed, it is
+the world.
 """
 
 from __future__ import annotations
@@ -40,10 +44,12 @@ from dynx.loaded.robot import (
     LoadedModel,
     LoadedRobot,
     called_joints,
+    checked_format,
     lacking_joints,
 )
 from dynx.model import Model
 from dynx.model.mechanism import ROOT
+from dynx.model.tree import Format
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
@@ -100,17 +106,27 @@ def set_joints(joints: Mapping[str, int], calls: Collection[str]) -> Setting:
     return change
 
 
-def set_inertias(model: Model, links: Mapping[str, int]) -> Setting:
-    """Return the setting that restores the moments of the file where Bullet replaced them by zero."""
+def set_inertias(model: Model, links: Mapping[str, int], *, restored: bool = True) -> Setting:
+    """Return the setting that restores the moments of the file where Bullet replaced them by zero; with
+    `restored` false that sets mass and moments of every link, about the axes that Bullet holds."""
 
     def change(client: LoadedClient) -> None:
+        known = {link.name for link in model.links}
         for name, k in links.items():
+            if name not in known:
+                continue
             inertial = model.inertial(name)
             held = client.dynamics(k)
-            if any(held[2]) or not inertial.tensor.any() or (k == ROOT and not client.floating):
+            if (
+                (restored and any(held[2]))
+                or not inertial.tensor.any()
+                or (k == ROOT and not client.floating)
+            ):
                 continue
             R = rotation_from_quat(np.array(held[4])).T @ inertial.origin.matrix[:3, :3]
             moments = np.diagonal(R @ inertial.tensor @ R.T).tolist()
+            if not restored:
+                client.call(client.engine.changeDynamics, client.body, k, mass=inertial.mass)
             client.call(client.engine.changeDynamics, client.body, k, localInertiaDiagonal=moments)
 
     return change
@@ -195,6 +211,9 @@ def _joint(engine: Any, info: Any, T_parent_com: Floats, T_child_com: Floats) ->
     )
 
 
+_FUNCTIONS: Mapping[Format, str] = {"urdf": "loadURDF", "mjcf": "loadMJCF", "sdf": "loadSDF"}
+"""PyBullet's function for each format."""
+
 USE_INERTIA = "URDF_USE_INERTIA_FROM_FILE"
 """Flag that makes PyBullet read the inertias of the file."""
 
@@ -203,6 +222,7 @@ class LoadedPyBullet(LoadedRobot):
     """A robot as PyBullet loads it; see `LoadedRobot` and the module docstring."""
 
     name: ClassVar[str] = "pybullet"
+    FORMATS: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf", "sdf")
     CALLS: ClassVar[Mapping[str, str]] = CALLS
     STEP_DEFAULTS: ClassVar[Mapping[str, str]] = STEP_DEFAULTS
     refuses_without: ClassVar[tuple[str, ...]] = ("visual", "collision")
@@ -210,15 +230,23 @@ class LoadedPyBullet(LoadedRobot):
 
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
         engine = bullet()
-        require_harmless(path, model)
+        self._form = checked_format(type(self), path)
+        if self._form == "urdf":
+            require_harmless(path, model)
         self._model = model
         fixed, flags = not model.floating, self._flags(calls)
-        self._clients = [LoadedClient(engine, path, model.name, fixed=fixed, flags=flags)]
+        reading = {
+            "fixed": fixed,
+            "flags": flags,
+            "function": _FUNCTIONS[self._form],
+            "joints": () if self._form == "urdf" else model.joint_names,
+        }
+        self._clients = [LoadedClient(engine, path, model.name, **reading)]
         try:
             self._prepare(calls)
             if self._client.refused and "pybullet.extrapolate_inertias" in calls:
                 for times in (1, 2):
-                    other = LoadedClient(engine, path, model.name, fixed=fixed, flags=flags)
+                    other = LoadedClient(engine, path, model.name, **reading)
                     self._clients.append(other)
                     self._set(other, calls)
                     other.apply(with_ballast(times))
@@ -231,7 +259,8 @@ class LoadedPyBullet(LoadedRobot):
         model, client = self._model, self._client
         root = client.call(client.engine.getBodyInfo, client.body)[0]
         children = {_text(info[12]): k for k, info in enumerate(client.joints)}
-        self._links = {_text(root): ROOT, **children}
+        is_world = self._form != "urdf" and not model.floating and model.root not in children
+        self._links = {model.root if is_world else _text(root): ROOT, **children}
         if model.floating and not client.floating:
             raise UnusableEngineError(
                 f"pybullet fixes {model.name} to the world: there its root {shown(model.root)} has no mass"
@@ -252,7 +281,7 @@ class LoadedPyBullet(LoadedRobot):
     def _set(self, client: LoadedClient, calls: Collection[str]) -> None:
         client.apply(disable_simulation_settings)
         if "pybullet.set_inertias" in calls:
-            client.apply(set_inertias(self._model, self._links))
+            client.apply(set_inertias(self._model, self._links, restored=self._form != "mjcf"))
         client.apply(set_joints({_text(client.joints[k][1]): k for k in client.moving}, calls))
 
     @classmethod
@@ -276,14 +305,22 @@ class LoadedPyBullet(LoadedRobot):
 
     @classmethod
     @checks_types
-    def load_call(cls, floating: bool, root: str | None = None) -> str:
+    def load_call(cls, floating: bool, root: str | None = None, form: Format = "urdf") -> str:
         """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
+        if form != "urdf":
+            return f"robots = p.{_FUNCTIONS[form]}(path)"
         return f"robot = p.loadURDF(path, useFixedBase={not floating}, flags=p.URDF_USE_INERTIA_FROM_FILE)"
 
     def describe(self) -> LoadedModel:
         """Describe the model from `getDynamicsInfo` and `getJointInfo`."""
         base = self.link_poses(self._model.neutral())[0]
+        if self._form != "urdf" and self._model.floating:
+            base = np.eye(4)
         described = describe_model(self._client, self._model, self._links, base)
+        if self._form == "sdf":
+            # A joint of SDF has a frame of its own; its place shows in the poses of links.
+            joints = {name: replace(joint, placement=None) for name, joint in described.joints.items()}
+            described = replace(described, joints=joints)
         return replace(described, engine=self.name)
 
     def close(self) -> None:
@@ -483,6 +520,7 @@ class PlainPyBullet(LoadedPyBullet):
     """A robot as PyBullet loads it without any flag; see the module docstring."""
 
     name: ClassVar[str] = "pybullet:plain"
+    FORMATS: ClassVar[tuple[Format, ...]] = ("urdf",)
     loads_meshes: ClassVar[bool] = True
     CALLS: ClassVar[Mapping[str, str]] = {
         **LoadedPyBullet.CALLS,
@@ -495,7 +533,7 @@ class PlainPyBullet(LoadedPyBullet):
 
     @classmethod
     @checks_types
-    def load_call(cls, floating: bool, root: str | None = None) -> str:
+    def load_call(cls, floating: bool, root: str | None = None, form: Format = "urdf") -> str:
         """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
         return "robot = p.loadURDF(path)" if floating else "robot = p.loadURDF(path, useFixedBase=True)"
 
@@ -504,6 +542,7 @@ class MergingPyBullet(LoadedPyBullet):
     """A robot as PyBullet loads it with links on fixed joints merged into their parents."""
 
     name: ClassVar[str] = "pybullet:merge"
+    FORMATS: ClassVar[tuple[Format, ...]] = ("urdf",)
     CALLS: ClassVar[Mapping[str, str]] = {
         **LoadedPyBullet.CALLS,
         KEEP_FIXED_LINKS: f"robot = p.loadURDF(path, ..., flags=p.{USE_INERTIA})  # not p.{_MERGE}",
@@ -515,6 +554,6 @@ class MergingPyBullet(LoadedPyBullet):
 
     @classmethod
     @checks_types
-    def load_call(cls, floating: bool, root: str | None = None) -> str:
+    def load_call(cls, floating: bool, root: str | None = None, form: Format = "urdf") -> str:
         """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
         return super().load_call(floating, root)[:-1] + f" | p.{_MERGE})"

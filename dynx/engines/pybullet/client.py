@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import weakref
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from math import isfinite
 from pathlib import Path
 from types import ModuleType
@@ -435,15 +435,26 @@ Setting = Callable[["LoadedClient"], None]
 
 
 class LoadedClient(RobotClient):
-    """One robot as `loadURDF` loads it."""
+    """One robot as `loadURDF`, `loadMJCF` or `loadSDF` loads it."""
 
     def __init__(
-        self, engine: ModuleType, path: Path, robot: str, *, fixed: bool, flags: Iterable[str]
+        self,
+        engine: ModuleType,
+        path: Path,
+        robot: str,
+        *,
+        fixed: bool,
+        flags: Iterable[str],
+        function: str = "loadURDF",
+        joints: Collection[str] = (),
     ) -> None:
-        """`flags` are names of constants of `engine` for ``loadURDF``."""
+        """`flags` are names of constants of `engine` for ``loadURDF``, `joints` the names by which the robot
+        is known among all bodies that another `function` loads."""
         super().__init__(engine, robot)
         self._fixed = fixed
         self._flags = sum(int(getattr(engine, flag)) for flag in flags)
+        self._function = function
+        self._joint_names = frozenset(joints)
         self._file = path.read_bytes()
         self._path = path
         self._settings: list[Setting] = []
@@ -460,6 +471,8 @@ class LoadedClient(RobotClient):
         self.joints = [self.call(engine.getJointInfo, self.body, k) for k in self.links]
         """`getJointInfo` of every joint, as loaded."""
         self.moving = [k for k, info in enumerate(self.joints) if info[2] != engine.JOINT_FIXED]
+        if function != "loadURDF":
+            refuse_many_joints(robot, len(self.moving))
         self.floating = not fixed and self.dynamics(ROOT)[0] != 0.0
         """True if the base moves: Bullet holds a root without mass still."""
 
@@ -514,7 +527,7 @@ class LoadedClient(RobotClient):
             return
         # The file is gone or another when a robot is loaded again.
         with temporary_folder() as folder:
-            path = folder / "robot.urdf"
+            path = folder / self._path.name
             path.write_bytes(self._file)
             self._load_from(path)
 
@@ -522,5 +535,16 @@ class LoadedClient(RobotClient):
         options = {"useFixedBase": self._fixed, "flags": self._flags}
         self.messages.clear()
         with capture_output(self.messages):
-            body = self.call(self.engine.loadURDF, str(path), **options)
-        self.body = int(body)
+            if self._function == "loadURDF":
+                self.body = int(self.call(self.engine.loadURDF, str(path), **options))
+                return
+            bodies = self.call(getattr(self.engine, self._function), str(path))
+        if not bodies:
+            raise EngineError(f"pybullet loads no body by {self._function} from {path.name}")
+        self.body = max(map(int, bodies), key=self._count_known)
+
+    def _count_known(self, body: int) -> int:
+        """Count the joints of a body that are the robot's."""
+        joints = range(int(self.call(self.engine.getNumJoints, body)))
+        names = (self.call(self.engine.getJointInfo, body, k)[1] for k in joints)
+        return sum(name.decode("utf-8", "replace") in self._joint_names for name in names)

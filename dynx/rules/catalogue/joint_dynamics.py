@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import ClassVar
 
-from dynx.errors import shown
+from dynx.errors import DynxError, shown
+from dynx.model.tree import Format
 from dynx.model.xml.source import SourceElement
 from dynx.rules import (
     CallingRule,
@@ -20,6 +22,14 @@ from dynx.rules.attributes import completion, misspelled_numbers, number_or_none
 from dynx.rules.joints import SINGLE, elements_in_joints, moves_by_actuator
 
 
+def _stated_coefficients(case: Case, name: str, what: str) -> Iterable[Detection]:
+    """Yield the joints of MJCF or SDF that move with a coefficient that is not zero."""
+    for joint in case.model.joints:
+        value = getattr(joint.dynamics, name)
+        if joint.moves and value:
+            yield Detection(None, joint.name, joint.line, f"the joint has {what} {value:g}")
+
+
 class DampingInInverseDynamics(CallingRule):
     """DX301 damping-in-inverse-dynamics: A joint has damping, which some engines add to the torque and others
     do not.
@@ -30,6 +40,7 @@ class DampingInInverseDynamics(CallingRule):
     - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``): rigid bodies only.
     - MuJoCo 4.0 (``mj_inverse``): damping times velocity is added.
     - Drake 1.51 (``CalcInverseDynamics`` with the plant's force elements): likewise.
+    - MJCF and SDF: MuJoCo and Drake likewise. PyBullet (``loadMJCF``) drops damping.
     - Forward dynamics: PyBullet's ``stepSimulation``, MuJoCo and Drake damp, Pinocchio's ``aba`` does not.
 
     The effect is damping times velocity, often a few per cent of the torque. Where the inertia is low, it is
@@ -41,6 +52,7 @@ class DampingInInverseDynamics(CallingRule):
     and prints the calls that switch damping off in each engine.
     """
 
+    formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf", "sdf")
     advice = "Decide whether torques include damping, and configure each engine accordingly."
     engines = measured_on("pybullet", "mujoco", "drake")
     calls = ("pybullet.no_damping", "mujoco.no_damping", "drake.no_damping")
@@ -48,6 +60,9 @@ class DampingInInverseDynamics(CallingRule):
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield joints that move with a damping that is not zero."""
+        if case.form != "urdf":
+            yield from _stated_coefficients(case, "damping", "damping")
+            return
         for _, dynamics in elements_in_joints(case, "dynamics", SINGLE):
             if damping := number_or_none(dynamics, "damping"):
                 yield found_at(dynamics, f"the joint has damping {damping:g}")
@@ -72,6 +87,7 @@ class FrictionInInverseDynamics(CallingRule):
     the rigid-body torque and prints the call that switches friction off in MuJoCo.
     """
 
+    formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")
     advice = "Decide whether torques include friction, and configure MuJoCo accordingly."
     engines = measured_on("mujoco")
     calls = ("mujoco.no_friction",)
@@ -79,6 +95,9 @@ class FrictionInInverseDynamics(CallingRule):
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield joints that move with a friction that is not zero."""
+        if case.form != "urdf":
+            yield from _stated_coefficients(case, "friction", "dry friction")
+            return
         for _, dynamics in elements_in_joints(case, "dynamics", SINGLE):
             if friction := number_or_none(dynamics, "friction"):
                 yield found_at(dynamics, f"the joint has dry friction {friction:g}")
@@ -134,6 +153,7 @@ class MimicAsConstraint(CallingRule):
     correct, so ``dynx doctor --fix`` does not change it.
     """
 
+    formats: ClassVar[tuple[Format, ...]] = ("urdf", "sdf")
     advice = "Know whether mimic joints are free, constrained or dependent in your engine."
     engines = measured_on("mujoco", "drake")
     calls = ("mujoco.no_mimic", "drake.free_mimics")
@@ -141,6 +161,12 @@ class MimicAsConstraint(CallingRule):
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield joints that follow a moving joint."""
+        if case.form == "sdf":
+            for joint in case.model.joints:
+                if joint.mimic is not None:
+                    message = f"the joint mimics {shown(joint.mimic.joint)}"
+                    yield Detection(None, joint.name, joint.line, message)
+            return
         for joint in case.model.joints:
             mimic = case.joints[joint.name].first("mimic")
             if joint.mimic is not None and mimic is not None:
@@ -272,6 +298,7 @@ class ContactsAsForces(CallingRule):
     not change it; doctor compares without contacts and prints the call that switches them off in MuJoCo.
     """
 
+    formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")
     advice = "Switch contacts off where you need rigid-body torques."
     engines = measured_on("mujoco")
     present_as = "contact_forces"
@@ -281,11 +308,25 @@ class ContactsAsForces(CallingRule):
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the robot, where two of its links have shapes."""
+        if case.form == "mjcf":
+            touching = [link for link in case.model.links if _collides(case, link.name)]
+            if touching:
+                message = f"{len(touching)} bodies have geoms, which may touch each other and the world"
+                yield Detection(None, None, touching[0].line, message)
+            return
         shaped = [link for link in case.source.root.all("link") if _first_shape(link) is not None]
         first = _first_shape(shaped[0]) if len(shaped) > 1 else None
         if first is not None:
             message = f"{len(shaped)} links have collision shapes, which may touch"
             yield Detection(None, None, first.line, message)
+
+
+def _collides(case: Case, link: str) -> bool:
+    """Check whether a link of MJCF has geoms that may touch others, also such as dynx does not read."""
+    try:
+        return bool(case.model.geometry.collisions(link))
+    except DynxError:
+        return True
 
 
 def _first_shape(link: SourceElement) -> SourceElement | None:

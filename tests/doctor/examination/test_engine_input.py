@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.doctor import diagnose
-from dynx.doctor.examination import temporary_urdf, with_mesh_boxes, without_meshes
+from dynx.doctor.examination import temporary_document, with_mesh_boxes, without_meshes
 from dynx.loaded import installed_engines
 from dynx.model.xml.source import SourceElement, XmlSource
 from tests.rules.documents import case_of, link
@@ -87,7 +87,7 @@ def test_a_file_is_written_as_it_was_read_and_is_gone_afterwards(tmp_path: Path)
     data = '<?xml version="1.0" encoding="iso-8859-1"?><robot name="é"><link name="ü"/></robot>'.encode(
         "latin-1"
     )
-    with temporary_urdf(without_meshes(XmlSource(data))) as path:
+    with temporary_document(without_meshes(XmlSource(data))) as path:
         assert path.read_bytes() == data
         assert path.suffix == ".urdf"
     assert not path.exists()

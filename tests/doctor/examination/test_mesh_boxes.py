@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynx.doctor.examination import temporary_urdf, without_meshes
+from dynx.doctor.examination import temporary_document, without_meshes
 from dynx.engines.silence import silence
 from dynx.loaded import installed_engines
 from dynx.model.geometry.mesh_files import find_mesh
@@ -96,7 +96,7 @@ def test_the_corners_of_a_mesh_have_its_inertia(tmp_path: Path, name: str, write
     source = without_meshes(XmlSource(path.read_bytes(), str(path)), collisions=False)
     (tmp_path / "raw.urdf").write_bytes(source.to_bytes())
     right = inertias(tmp_path / "raw.urdf")[""]
-    with temporary_urdf(source, mesh_boxes=True) as written:
+    with temporary_document(source, mesh_boxes=True) as written:
         assert written.read_text().count("<collision>") == 1
         assert np.max(np.abs(inertias(written)[""] - right)) <= 1e-12 * np.max(right)
     assert np.max(right) > 0.05
@@ -117,7 +117,7 @@ def test_real_meshes_have_the_inertia_of_their_corners(robot: str, tmp_path: Pat
     raw = tmp_path / "raw.urdf"
     raw.write_bytes(source.apply(*edits).to_bytes())
     right = inertias(raw)
-    with temporary_urdf(source, mesh_boxes=True) as written:
+    with temporary_document(source, mesh_boxes=True) as written:
         got = inertias(written)
     for name, moments in right.items():
         assert np.max(np.abs(got[name] - moments)) <= 1e-7 * np.max(moments), name
@@ -140,5 +140,5 @@ def test_a_mesh_that_is_missing_damaged_or_of_text_is_left_out(tmp_path: Path) -
         "m.ply",
     ):
         path.write_text(LINK.format(name))
-        with temporary_urdf(XmlSource(path.read_bytes(), str(path)), mesh_boxes=True) as written:
+        with temporary_document(XmlSource(path.read_bytes(), str(path)), mesh_boxes=True) as written:
             assert "<collision>" not in written.read_text()

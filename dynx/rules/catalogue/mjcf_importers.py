@@ -1,0 +1,541 @@
+"""What importers of MJCF leave out or read otherwise than MuJoCo does: each place can be written out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from dynx.errors import shown
+from dynx.model.elements import Inertial
+from dynx.model.mjcf.document import MjcfText
+from dynx.model.tree import Format
+from dynx.model.xml.reading import Element
+from dynx.model.xml.source import Edit, SourceElement
+from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Rule, measured_on
+from dynx.rules.mjcf import (
+    BodyInText,
+    bodies_in_text,
+    decimals,
+    inertial_text,
+    mjcf_text,
+    quaternion_text,
+    with_defaults,
+)
+from dynx.spatial.scalar import Floats
+
+_ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+
+
+def _stated_inertial(case: Case, body: BodyInText) -> list[Edit] | None:
+    """Return the edits that state the inertia of a body as dynx reads it; None where it has none."""
+    names = {link.name for link in case.model.links}
+    inertial = case.model.link(body.name).inertial if body.name in names else None
+    if inertial is None or not inertial.mass:
+        return None
+    text = inertial_text(inertial)
+    given = body.element.first("inertial")
+    source = case.source
+    if given is None:
+        return [source.insertion(body.element, text, first=True)]
+    return [source.replacement(given, text)]
+
+
+class InertiaByDefaultClass(EditingRule):
+    """DX601 inertia-by-default-class: The mass of a body follows from geoms that take attributes from a class
+    of defaults, which not every importer applies.
+
+    ``<default class="part"><geom mass="2"/></default>`` gives a mass to each ``<geom class="part"/>``.
+
+    - MuJoCo 4.0 applies classes to all attributes, and a class has what the classes around it have.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) applies the density and the size of a class, and neither its
+      mass, nor its type, place or orientation: the body weighs what the density of water gives.
+    - Drake 1.51 loses what a class has from the class around it where a class between them has no ``<geom>``.
+    - PyBullet 3.2.7 (``loadMJCF``) applies little of a class.
+
+    The effect is the mass of the body, by any factor.
+
+    What to do: write an ``<inertial>`` for the body. ``dynx doctor --fix`` does so, with the numbers that
+    follow from the geoms by the rules of MuJoCo; all engines read them.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Write an <inertial> for each body."
+    engines = measured_on("pinocchio", "pybullet", "drake")
+    changed = "wrote the inertia that follows from geoms"
+
+    _APPLIED = ("mass", "density", "type", "size", "fromto", "pos", "mesh", *_ORIENTATIONS)
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield bodies without an inertial of their own, with a geom that takes such an attribute."""
+        document = mjcf_text(case)
+        if document.compiler.inertia_from_geom == "true":
+            return
+        for body in bodies_in_text(case, document):
+            if body.element.first("inertial") is not None:
+                continue
+            for geom in body.children("geom"):
+                resolved = with_defaults(document, geom, body.childclass)
+                taken = [name for name in self._APPLIED if name in resolved and name not in geom.attributes]
+                edits = _stated_inertial(case, body) if taken else None
+                if edits:
+                    message = f"a geom takes {' and '.join(taken)} from a class of defaults"
+                    yield Correction(Detection(body.name, None, geom.line, message), tuple(edits))
+                    break
+
+
+_SETTINGS = {
+    "inertiagrouprange": ("inertia_groups", (0.0, 5.0)),
+    "boundmass": ("bound_mass", 0.0),
+    "boundinertia": ("bound_inertia", 0.0),
+    "balanceinertia": ("balance_inertia", False),
+    "settotalmass": ("total_mass", -1.0),
+}
+
+
+class InertiaByCompilerSetting(EditingRule):
+    """DX602 inertia-by-compiler-setting: The compiler changes masses or inertias by a setting that importers
+    drop.
+
+    ``<compiler>`` may select the geoms that have a mass (``inertiagrouprange``), raise small masses and
+    moments (``boundmass``, ``boundinertia``), replace impossible moments (``balanceinertia``) and scale all
+    of them (``settotalmass``).
+
+    - MuJoCo 4.0 applies all of these.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) applies the two bounds alone.
+    - Drake 1.51 applies none of them, and refuses moments that ``balanceinertia`` would replace.
+    - PyBullet 3.2.7 (``loadMJCF``) applies none.
+
+    The effect is the change by the setting: with ``settotalmass`` the mass of the whole robot.
+
+    What to do: write an ``<inertial>`` with the final numbers for each body. ``dynx doctor --fix`` does
+    so.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Write the final inertia of each body, and no setting that changes it."
+    engines = measured_on("pinocchio", "drake", "pybullet")
+    changed = "wrote the inertia with the settings of <compiler> applied"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield bodies whose inertia is not yet stated as the settings make it."""
+        document = mjcf_text(case)
+        given = [
+            name for name, (field, plain) in _SETTINGS.items() if getattr(document.compiler, field) != plain
+        ]
+        if not given:
+            return
+        settings = " and ".join(given)
+        for body in bodies_in_text(case, document):
+            edits = _stated_inertial(case, body)
+            if not edits or _is_stated(case, body, document):
+                continue
+            message = f"{settings} of <compiler> acts on the inertia of the body"
+            yield Correction(Detection(body.name, None, body.element.line, message), tuple(edits))
+
+
+def _is_stated(case: Case, body: BodyInText, document: MjcfText) -> bool:
+    """Check whether a body states its final inertia itself."""
+    given = body.element.first("inertial")
+    if given is None or document.compiler.inertia_from_geom == "true" or body.name is None:
+        return False
+    inertial = case.model.inertial(body.name)
+    mass = float(given.attributes.get("mass", "nan"))
+    words = given.attributes.get("diaginertia", given.attributes.get("fullinertia", "")).split()
+    moments = [float(word) for word in words][:3]
+    held = (
+        np.diagonal(inertial.tensor)
+        if "diaginertia" in given.attributes
+        else np.diagonal(_tensor_of(inertial))
+    )
+    close = np.allclose(moments, held, rtol=1e-14, atol=0.0) if len(moments) == 3 else False
+    return abs(mass - inertial.mass) <= 1e-14 * inertial.mass and bool(close)
+
+
+def _tensor_of(inertial: Inertial) -> Floats:
+    """Return the central tensor (3, 3) in the axes of the body."""
+    R = inertial.origin.matrix[:3, :3]
+    return np.asarray(R @ inertial.tensor @ R.T)
+
+
+class OrientationOtherThanQuaternion(EditingRule):
+    """DX603 orientation-other-than-quaternion: An orientation is no quaternion, and importers read it
+    otherwise.
+
+    MJCF has five attributes for an orientation: ``quat``, ``axisangle``, ``euler`` in the sequence
+    ``eulerseq``, ``xyaxes`` and ``zaxis``.
+
+    - MuJoCo 4.0 and Drake 1.51 read all of them alike.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) does not normalise the axis of ``axisangle``, and reads capital
+      letters of ``eulerseq`` (axes that stay) as small ones (axes that turn along).
+    - PyBullet 3.2.7 (``loadMJCF``) reads ``quat`` alone as MuJoCo does. It takes angles of ``euler`` with the
+      other sign or as degrees, and drops the rest.
+
+    The effect is another pose of the body and of all bodies that it carries.
+
+    What to do: write ``quat``. ``dynx doctor --fix`` does so.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Write orientations as quat."
+    engines = measured_on("pinocchio", "pybullet")
+    changed = "wrote orientations as quaternions"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield bodies and inertials with another attribute."""
+        document = mjcf_text(case)
+        for body in bodies_in_text(case, document):
+            for element in (body.element, *body.children("inertial")):
+                given = [name for name in _ORIENTATIONS[1:] if name in element.attributes]
+                if len(given) != 1:
+                    continue
+                plain = Element(element.tag, dict(element.attributes), element.line)
+                R = document.rotation(plain, "the body")
+                message = f"{given[0]} states the orientation"
+                yield Correction(
+                    Detection(body.name, None, element.line, message),
+                    (
+                        case.source.attribute_removal(element, given[0]),
+                        case.source.attribute_edit(element, "quat", quaternion_text(R)),
+                    ),
+                )
+
+
+class InertiaNotPrincipal(EditingRule):
+    """DX611 inertia-not-principal: An ``<inertial>`` of MJCF has products of inertia, which PyBullet
+    drops.
+
+    ``fullinertia`` states the six entries of a tensor, ``diaginertia`` three moments about the axes that the
+    orientation of the ``<inertial>`` states.
+
+    - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read both.
+    - PyBullet 3.2.7 (``loadMJCF``) has an inertial frame and three moments for each body. It reads the
+      orientation, and no tensor: the moments that a program sets afterwards (DX610) are about these axes.
+
+    The effect is that of the products of inertia.
+
+    What to do: write ``diaginertia`` about principal axes. ``dynx doctor --fix`` does so.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Write diaginertia about principal axes."
+    engines = measured_on("pybullet")
+    changed = "wrote inertias about principal axes"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield inertials with products of inertia."""
+        document = mjcf_text(case)
+        for body in bodies_in_text(case, document):
+            for inertial in body.children("inertial"):
+                words = inertial.attributes.get("fullinertia", "").split()
+                numbers = [float(word) for word in words]
+                if len(numbers) != 6 or not any(numbers[3:]):
+                    continue
+                xx, yy, zz, xy, xz, yz = numbers
+                moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+                axes = axes * np.sign(np.linalg.det(axes))
+                source = case.source
+                yield Correction(
+                    Detection(body.name, None, inertial.line, "the inertial has products of inertia"),
+                    (
+                        source.attribute_removal(inertial, "fullinertia"),
+                        source.attribute_edit(inertial, "diaginertia", decimals(moments)),
+                        source.attribute_edit(inertial, "quat", quaternion_text(axes)),
+                    ),
+                )
+
+
+class ThreeJointsInBody(Rule):
+    """DX607 three-joints-in-body: A body has three joints or more, which Drake connects otherwise.
+
+    A body of MJCF may have several joints, which act one after the other: three hinges stand for a wrist.
+
+    - MuJoCo 4.0 and Pinocchio 4.1 read any number. PyBullet 3.2.7 (``loadMJCF``) does where they stand at one
+      point.
+    - Drake 1.51 adds bodies in between, named ``wrist0`` and ``wrist1``. With two joints the poses are those
+      of MuJoCo, with three or more they are not.
+
+    The effect is another pose of the body and of all bodies that it carries.
+
+    What to do: convert the file to URDF or SDF for Drake (``dynx convert --to urdf``), where each joint
+    has links of its own. No edit of the MJCF helps, since MuJoCo refuses bodies without mass that move. So
+    the effect in a report is what remains of the difference without all other causes.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    advice = "Convert the file to URDF or SDF for Drake (dynx convert --to urdf)."
+    engines = measured_on("drake")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield bodies with three joints."""
+        document = mjcf_text(case)
+        for body in bodies_in_text(case, document):
+            joints = body.children("joint")
+            if len(joints) > 2:
+                message = f"the body has {len(joints)} joints"
+                yield Detection(body.name, None, joints[0].line, message)
+
+
+class FrameOfBodies(Rule):
+    """DX608 frame-of-bodies: A ``<frame>`` or ``<replicate>`` holds bodies, which importers leave out.
+
+    ``<frame pos="0 0 1">`` moves all that it holds; ``<replicate count="4" euler="0 0 90">`` repeats it.
+
+    - MuJoCo 4.0 reads both.
+    - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) skip the element
+      with all bodies, joints and geoms in it; Drake warns.
+
+    The robot lacks these bodies, and an engine whose robot lacks a joint cannot be compared.
+
+    What to do: write the bodies with their own poses, as MuJoCo does: ``mj_saveLastXML`` writes the file
+    without frames. Or convert it (``dynx convert --to mjcf``). ``dynx doctor --fix`` does not change it.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    advice = "Write the bodies with their own poses (dynx convert --to mjcf)."
+    engines = measured_on("pinocchio", "drake", "pybullet")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield frames and replicates that hold parts of bodies."""
+        for tree in case.source.root.all("worldbody"):
+            for element in tree.walk():
+                if element.tag in ("frame", "replicate") and element.children:
+                    yield Detection(None, None, element.line, f"a <{element.tag}> holds parts of the robot")
+
+
+class SeveralBodiesInWorld(Rule):
+    """DX609 several-bodies-in-world: The world has several bodies, of which Pinocchio loads the first.
+
+    A table, a floor or a second robot may stand beside the robot in ``<worldbody>``.
+
+    - MuJoCo 4.0 and Drake 1.51 load all of them.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) loads the first body of the world and what it carries, and drops
+      the others without a message.
+    - PyBullet 3.2.7 (``loadMJCF``) makes a robot of each; ``loadMJCF`` returns several.
+
+    Where the table comes first, the robot of Pinocchio has no joint.
+
+    What to do: put the robot first, or into a file of its own, which the scene includes. The order of
+    bodies is that of the coordinates, so that ``dynx doctor --fix`` does not change it.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    advice = "Put the robot first, or into a file of its own."
+    engines = measured_on("pinocchio")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the second body of the world, where a body of the robot is not in the first."""
+        bodies = [body for tree in case.source.root.all("worldbody") for body in tree.all("body")]
+        for body in bodies[1:]:
+            if any(each.tag == "joint" for each in body.walk()):
+                name = body.attributes.get("name")
+                yield Detection(name, None, body.line, "the body is not the first of the world")
+
+
+class MjcfInSinglePrecision(Rule):
+    """DX612 mjcf-in-single-precision: PyBullet reads the numbers of MJCF in single precision.
+
+    A number such as 0.1 has no exact binary form: in double precision it is wrong by 1e-17, in single
+    precision by 1e-9.
+
+    - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read double precision. MuJoCo holds meshes in single precision.
+    - PyBullet 3.2.7 (``loadMJCF``) reads positions, orientations, axes and sizes in single precision.
+
+    The effect is an error of about 1e-8 of every quantity. It is no cause of a fall, and hides other
+    differences from a comparison at 1e-12.
+
+    What to do: nothing, or compare with ``--tolerance 1e-6``. No edit that keeps the numbers helps. So the
+    effect in a report is what remains of the difference without all other causes.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    stated_bound = 1e-5
+    advice = "Compare PyBullet's reading of MJCF with a tolerance of 1e-6."
+    engines = measured_on("pybullet")
+
+    _READ = ("pos", "quat", "axis", "mass")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the first number that single precision does not hold."""
+        for tree in case.source.root.all("worldbody"):
+            for element in tree.walk():
+                for name in self._READ if element.tag in ("body", "joint", "inertial") else ():
+                    for word in element.attributes.get(name, "").split():
+                        if float(np.float32(float(word))) != float(word):
+                            message = f"{word} is read as {float(np.float32(float(word))):.10g}"
+                            yield Detection(None, None, element.line, message)
+                            return
+
+
+class JointByDefaultClass(EditingRule):
+    """DX604 joint-by-default-class: A joint takes attributes from a class of defaults, which not every
+    importer applies.
+
+    ``<default><joint type="slide" axis="0 0 1"/></default>`` makes every joint slide along z.
+
+    - MuJoCo 4.0 and Drake 1.51 apply classes to all attributes of joints.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) does not apply ``pos``, so that the axis passes through the
+      origin of the body.
+    - PyBullet 3.2.7 (``loadMJCF``) applies neither ``type`` nor ``axis``, ``pos`` and ``range``. A joint
+      without a type of its own is no joint there: the body is fixed.
+
+    The effect is another axis, or a joint less.
+
+    What to do: write these attributes at the joint. ``dynx doctor --fix`` does so.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Write type, axis, pos and range at each joint."
+    engines = measured_on("pinocchio", "pybullet")
+    changed = "wrote attributes of classes of defaults at the joints"
+
+    _APPLIED = ("type", "axis", "pos", "ref", "range", "limited")
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield joints that take such an attribute from a class."""
+        document = mjcf_text(case)
+        for body, joint in _joints_in_text(case, document):
+            resolved = with_defaults(document, joint, body.childclass)
+            taken = [name for name in self._APPLIED if name in resolved and name not in joint.attributes]
+            if taken:
+                edits = tuple(case.source.attribute_edit(joint, name, resolved[name]) for name in taken)
+                message = f"the joint takes {' and '.join(taken)} from a class of defaults"
+                yield Correction(Detection(None, joint.attributes.get("name"), joint.line, message), edits)
+
+
+class JointWithoutType(EditingRule):
+    """DX605 joint-without-type: A joint states no type, which PyBullet takes for no joint.
+
+    The type of a ``<joint>`` is ``hinge`` unless it is stated, by the joint or its class of defaults.
+
+    - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read a hinge.
+    - PyBullet 3.2.7 (``loadMJCF``) prints "expected 'type' attribute for joint" and leaves the joint out. Its
+      body is then fixed to the one that carries it.
+
+    Most files state no type for hinges, so that PyBullet loads robots without any joint.
+
+    What to do: write ``type="hinge"``. ``dynx doctor --fix`` does so.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = 'Write type="hinge".'
+    engines = measured_on("pybullet")
+    changed = 'wrote type="hinge" at joints without a type'
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield joints without a type, of their own or of their class."""
+        document = mjcf_text(case)
+        for body, joint in _joints_in_text(case, document):
+            if "type" not in with_defaults(document, joint, body.childclass):
+                edit = case.source.attribute_edit(joint, "type", "hinge")
+                detection = Detection(
+                    None, joint.attributes.get("name"), joint.line, "the joint states no type"
+                )
+                yield Correction(detection, (edit,))
+
+
+class JointWithoutName(EditingRule):
+    """DX606 joint-without-name: A joint has no name, so that each engine gives it another one.
+
+    Names of joints are optional in MJCF.
+
+    - MuJoCo 4.0 leaves the joint without a name; it has a number.
+    - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) make names of the
+      names of bodies or of numbers, each in its own way: ``leg_joint_0``, ``trunk-leg``, ``joint2_4_2``.
+
+    No coordinate of one engine can be found by its name in another one, and code that looks joints up by
+    their names works in one engine alone.
+
+    What to do: name every joint. ``dynx doctor --fix`` writes the name that dynx gives the joint.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Name every joint."
+    engines = measured_on("pinocchio", "drake", "pybullet")
+    changed = "named joints"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield joints without a name that are not free."""
+        document = mjcf_text(case)
+        names = {joint.line: joint.name for joint in case.model.joints if joint.moves}
+        counts: dict[int, int] = {}
+        for _, joint in _joints_in_text(case, document):
+            counts[joint.line] = counts.get(joint.line, 0) + 1
+        for body, joint in _joints_in_text(case, document):
+            if "name" in joint.attributes:
+                continue
+            name = names.get(joint.line) if counts[joint.line] == 1 else None
+            edits = () if name is None else (case.source.attribute_edit(joint, "name", name),)
+            of_body = f" of body {shown(body.name)}" if body.name else ""
+            detection = Detection(body.name, None, joint.line, f"a joint{of_body} has no name")
+            yield Correction(detection, edits)
+
+
+class InertiaFromShapesOfMjcf(CallingRule):
+    """DX610 inertia-from-shapes-of-mjcf: PyBullet computes inertias from shapes, whatever an ``<inertial>``
+    says.
+
+    ``<inertial mass="2" diaginertia="0.1 0.1 0.2"/>`` states the mass and the moments of a body.
+
+    - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read both.
+    - PyBullet 3.2.7 (``loadMJCF``) reads the mass and the centre of mass. It computes the moments from the
+      bounding box of the shapes; without shapes they are 0. For a body without ``<inertial>`` it computes the
+      mass from a density of 1000, and does not read ``mass`` of a geom. No flag of ``loadMJCF`` changes that:
+      with ``URDF_USE_INERTIA_FROM_FILE`` all moments are 0.
+
+    The effect is the inertia of every body: tens of per cent of the mass matrix for most robots.
+
+    What to do: set the masses and the moments of the file after loading, or convert the file to URDF
+    (``dynx convert --to urdf``) and load it with the flag. The file is correct, so ``dynx doctor --fix``
+    does not change it; doctor prints the call.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Set mass and moments after loading, or load a URDF (dynx convert --to urdf)."
+    engines = measured_on("pybullet")
+    calls = ("pybullet.set_inertias",)
+    changed = "compared with the masses and moments of the file"
+    per_joint = False
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield bodies whose moments are not those of one box that is all their shape."""
+        document = mjcf_text(case)
+        boxes = {body.name: _moments_of_box(body, document) for body in bodies_in_text(case, document)}
+        for link in case.model.links:
+            inertial = link.inertial
+            if inertial is None or not inertial.mass:
+                continue
+            ratio, tensor = boxes.get(link.name), _tensor_of(inertial)
+            if ratio is not None and np.allclose(
+                np.diag(ratio) * inertial.mass, tensor, rtol=1e-12, atol=0.0
+            ):
+                continue
+            message = f"the body has {inertial.mass:.4g} kg and moments of its own"
+            yield Detection(link.name, None, link.line, message)
+
+
+def _moments_of_box(body: BodyInText, document: MjcfText) -> Floats | None:
+    """Return the moments (3,) of the one box of a body, for 1 kg; None for other shapes, and for a body that
+    states no inertial."""
+    geoms = body.children("geom", "frame")
+    given = with_defaults(document, geoms[0], body.childclass) if len(geoms) == 1 else {}
+    stated = body.element.first("inertial") is not None
+    if not stated or given.get("type") != "box" or any(name in given for name in _ORIENTATIONS):
+        return None
+    half = np.array([float(word) for word in given.get("size", "").split()])
+    if half.shape != (3,):
+        return None
+    return np.asarray((half @ half - half**2) / 3.0)
+
+
+def _joints_in_text(case: Case, document: MjcfText) -> Iterator[tuple[BodyInText, SourceElement]]:
+    """Yield the joints that turn or slide, with their bodies."""
+    for body in bodies_in_text(case, document):
+        for joint in body.children("joint"):
+            if with_defaults(document, joint, body.childclass).get("type") != "free":
+                yield body, joint
