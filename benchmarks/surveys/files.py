@@ -24,7 +24,7 @@ from typing import Any
 
 from dynx.cli.doctor.run import FIX_TOLERANCE
 from dynx.doctor import diagnose
-from dynx.doctor.examination import temporary_urdf, without_meshes
+from dynx.doctor.examination import temporary_document, without_meshes
 from dynx.engines.silence import silence
 from dynx.errors import DynxError
 from dynx.loaded import installed_engines
@@ -95,7 +95,7 @@ def load_alone(task: Loading) -> str | None:
             slim = without_meshes(XmlSource(path.read_bytes(), str(path)))
         except DynxError:
             return message
-        with temporary_urdf(slim) as copy:
+        with temporary_document(slim) as copy:
             message = _call(task.engine, copy)
     return message
 

@@ -21,7 +21,8 @@ from dynx.cli.shell.output import (
 from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
 from dynx.errors import ArgumentError, shown
 from dynx.files.writing import write_bytes
-from dynx.model.conversion import SUFFIXES, Format
+from dynx.model.conversion import SUFFIXES
+from dynx.model.document_format import Format
 from dynx.model.loading import read_description, split_arguments
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource

@@ -343,6 +343,9 @@ class CauseAttributor:
 
 
 def _coordinates(case: Case) -> tuple[object, ...]:
+    if case.form != "urdf":
+        model = case.model if case.readable else None
+        return () if model is None else (tuple(link.name for link in model.links), model.joint_names)
     joints = case.source.root.all("joint")
     links = case.source.root.all("link")
     return (

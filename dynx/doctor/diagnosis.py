@@ -69,10 +69,11 @@ from dynx.loaded import COMMON_VARIANTS, ENGINES, VARIANTS, engine_of, installed
 from dynx.loaded.difference import model_difference
 from dynx.loaded.robot import LoadedRobot, format_name
 from dynx.model import Model
+from dynx.model.document_format import format_of_root
 from dynx.model.documents import bare_urdf
 from dynx.model.loading import read_description, read_model
 from dynx.model.numbers import checked_seed, is_real, whole_number
-from dynx.model.tree import STANDARD_GRAVITY, Base, checked_base, format_of_root
+from dynx.model.tree import STANDARD_GRAVITY, Base, checked_base
 from dynx.model.xml.source import XmlSource
 from dynx.rules import LEVELS, CallingRule, Case, Detection, Level, Rule, all_rules
 from dynx.rules.case import end_of
@@ -110,7 +111,7 @@ def first_report(case: Case, before: Examination, tolerance: float) -> DoctorRep
         tolerance=max(tolerance, min(REFERENCE_MARGIN * referee, MAX_RAISED_TOLERANCE)),
         pairs=_pairs(before),
         referee=referee,
-        model_difference=tuple(model_difference(model.with_gravity(stated), descriptions)),
+        model_difference=tuple(model_difference(model, descriptions, stated)),
         refusal=None if isinstance(case.reading, Model) else _failure(case.reading),
         text=case.source.text,
         form=case.source.form,
@@ -462,9 +463,9 @@ def diagnose(
     in tilted gravity; a relative error above `tolerance` is a difference. By default common variants are
     examined too (`DoctorReport.variants`); they differ by the user's call, which no file can mend, so they
     count as differences only if `engines` names them. The mended file has no effect above `fix_tolerance`,
-    with which its new numbers have the fewest digits that keep every engine within a tenth of it (default: no effect
-    above `tolerance`, and all digits). `choose` maps rule ids to one of the rule's `choices`. `level` is the
-    largest change of the mended file: ``safe`` changes nothing that a reader notices, ``rounding`` the
+    with which its new numbers have the fewest digits that keep every engine within a tenth of it (default: no
+    effect above `tolerance`, and all digits). `choose` maps rule ids to one of the rule's `choices`. `level`
+    is the largest change of the mended file: ``safe`` changes nothing that a reader notices, ``rounding`` the
     equations of motion by rounding only, ``physics`` whatever the causes require. `ignore` has ids or names
     of rules whose findings make no check fail; with `only`, those of all other rules do not either. They stay
     in `findings`, are counted in `DoctorReport.ignored`, and are mended. `counterexamples` selects

@@ -22,10 +22,11 @@ from dynx.errors import DescriptionError, DynxError, UnusableEngineError
 from dynx.files.temporary import temporary_folder
 from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.model import Model
+from dynx.model.document_format import Format, format_of_root
 from dynx.model.elements import Vector
 from dynx.model.geometry.formats.facets import STL_FACET
 from dynx.model.loading import read_model
-from dynx.model.tree import Base, Format, format_of_root
+from dynx.model.tree import Base
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Detection, Rule

@@ -19,7 +19,7 @@ from dynx.files.documents import document_of, to_json_values
 from dynx.files.pages import html_grid
 from dynx.loaded import engine_of
 from dynx.loaded.difference import Deviation
-from dynx.model.tree import Format
+from dynx.model.document_format import Format
 from dynx.model.xml.text import TextForm
 from dynx.rules.registry import all_rules
 from dynx.rules.rule import Kind, Level

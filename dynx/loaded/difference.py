@@ -15,7 +15,8 @@ import numpy as np
 
 from dynx.loaded.robot import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.model import Joint, Model
-from dynx.model.elements import Inertial
+from dynx.model.elements import Inertial, Vector
+from dynx.model.tree import STANDARD_GRAVITY
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
 from dynx.spatial.so3 import rpy_from_rotation
@@ -112,8 +113,12 @@ class Deviation:
 Row = tuple[str, str, str, Any, Any]
 
 
-def model_difference(model: Model, loaded: Iterable[LoadedModel]) -> tuple[Deviation, ...]:
+def model_difference(
+    model: Model, loaded: Iterable[LoadedModel], gravity: Vector = STANDARD_GRAVITY
+) -> tuple[Deviation, ...]:
     """Return every deviation of the engines from `model`, engine by engine, links before joints.
+
+    `gravity` [m/s^2] is that of the file: URDF states none, and has the standard one.
 
     The inertia of the root link of a fixed base is not compared: no result depends on it, and some engines
     drop it. `model` has the base with which the engines loaded the file.
@@ -123,11 +128,11 @@ def model_difference(model: Model, loaded: Iterable[LoadedModel]) -> tuple[Devia
     return tuple(
         Deviation(each.engine, *row, line=lines.get((row[0], row[1])))
         for each in loaded
-        for row in _rows(model, each)
+        for row in _rows(model, each, gravity)
     )
 
 
-def _rows(model: Model, engine: LoadedModel) -> Iterator[Row]:
+def _rows(model: Model, engine: LoadedModel, gravity: Vector) -> Iterator[Row]:
     reach = _reach(model)
     added = _added_links(model)
     yield from _links(model, engine, reach, added)
@@ -148,8 +153,8 @@ def _rows(model: Model, engine: LoadedModel) -> Iterator[Row]:
             yield "joint", name, "existence", None, engine.joints[name].type
     for property, file, value in _pose(model.base_pose.matrix, engine.base_frame, reach):
         yield "base", model.root, property, file, value
-    if _differ(np.array(model.gravity), engine.gravity):
-        yield "gravity", "gravity", "default", list(model.gravity), engine.gravity.tolist()
+    if _differ(np.array(gravity), engine.gravity):
+        yield "gravity", "gravity", "default", list(gravity), engine.gravity.tolist()
 
 
 def _added_links(model: Model) -> set[str]:

@@ -73,7 +73,8 @@ def load_as(
     file = Path(path)
     if not file.is_file():
         raise RobotNotFoundError(
-            f"no file {shown(path)}; wanted the path of a file, which {shown(engine)} loads itself"
+            f"no file {shown(path)}; wanted the path of a file in URDF, MJCF or SDF, which "
+            f"{shown(engine)} loads itself"
         )
     return loader_class(engine)(file, model, calls)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from dynx.errors import DescriptionError, EngineError, UnusableEngineError, shown
 from dynx.model import Model
-from dynx.model.tree import Format, format_of_root
+from dynx.model.document_format import Format, format_of_root
 from dynx.model.xml.source import XmlSource
 from dynx.spatial.scalar import Floats
 

@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from dynx.errors import ArgumentError, DescriptionError, DynxError, UnknownNameE
 from dynx.files.reading import read_file
 from dynx.files.temporary import temporary_folder
 from dynx.files.writing import write_bytes
+from dynx.model.document_format import Format
 from dynx.model.elements import Frame, Inertial, Joint, Pose
 from dynx.model.geometry import (
     Box,
@@ -40,8 +41,6 @@ from dynx.model.model import Model
 from dynx.model.sdf.writer import SdfWriter
 from dynx.model.urdf.writer import urdf_notes, urdf_text
 from dynx.spatial.scalar import Floats
-
-Format = Literal["mjcf", "sdf", "urdf"]
 
 SUFFIXES: Mapping[Format, tuple[str, ...]] = {
     "mjcf": (".xml", ".mjcf"),

@@ -16,9 +16,6 @@ from dynx.model.geometry.links import Geometry
 from dynx.spatial.scalar import Floats
 
 Base = Literal["fixed", "floating"]
-Format = Literal["urdf", "mjcf", "sdf"]
-"""Format of the document of a robot."""
-
 Part = TypeVar("Part")
 STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
 NO_GEOMETRY = Geometry({})
@@ -225,13 +222,6 @@ class Description:
     """The base that the file states; None for a format that leaves it open."""
     gravity: Vector = STANDARD_GRAVITY
     base_pose: Pose = IDENTITY
-
-
-def format_of_root(tag: str) -> Format:
-    """Return the format of a document by the tag of its root; every other tag is read as URDF."""
-    if tag == "mujoco":
-        return "mjcf"
-    return "sdf" if tag == "sdf" else "urdf"
 
 
 def checked_base(base: str) -> Literal["fixed", "floating"]:

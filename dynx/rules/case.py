@@ -10,9 +10,10 @@ from functools import cached_property
 from dynx.argument_types import checks_types
 from dynx.errors import DynxError
 from dynx.model import Model
+from dynx.model.document_format import Format, format_of_root
 from dynx.model.elements import Inertial, Vector
 from dynx.model.loading import read_model
-from dynx.model.tree import STANDARD_GRAVITY, Base, Format, format_of_root
+from dynx.model.tree import STANDARD_GRAVITY, Base
 from dynx.model.xml.source import SourceElement, XmlSource
 
 

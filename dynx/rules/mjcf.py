@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.model.elements import Inertial
-from dynx.model.mjcf.document import MjcfText, read_document
+from dynx.model.mjcf.document import MjcfText
+from dynx.model.mjcf.expansion import read_document
 from dynx.model.xml.reading import Element
 from dynx.model.xml.source import SourceElement
 from dynx.rules.case import Case
@@ -64,8 +65,8 @@ def found_in(document: MjcfText, element: Element, message: str, **place: str | 
 class BodyInText:
     """A body of the text of the case itself, not of an included file, which edits can change.
 
-    `name` is that of its link; None where it is not known, because an ``<include>`` or ``<replicate>`` before
-    it adds bodies. `childclass` is the class of defaults of its children.
+    `name` is that of its link; None where it is not known, because an ``<include>``, ``<attach>`` or
+    ``<replicate>`` before it adds bodies. `childclass` is the class of defaults of its children.
     """
 
     element: SourceElement
@@ -82,7 +83,10 @@ def bodies_in_text(case: Case, document: MjcfText) -> list[BodyInText]:
     found: list[BodyInText] = []
     trees = reversed(case.source.root.all("worldbody"))
     waiting: list[tuple[SourceElement, str | None]] = [(tree, None) for tree in trees]
-    bodies, counted = 0, not any(each.tag in ("include", "replicate") for each in case.source.root.walk())
+    bodies, counted = (
+        0,
+        not any(each.tag in ("include", "replicate", "attach") for each in case.source.root.walk()),
+    )
     while waiting:
         element, childclass = waiting.pop()
         inner = element.attributes.get("childclass", childclass)

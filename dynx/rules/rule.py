@@ -16,7 +16,8 @@ from packaging.specifiers import SpecifierSet
 from dynx.argument_types import checks_types
 from dynx.loaded import engine_of
 from dynx.loaded.robot import call_on_joint
-from dynx.model.tree import Base, Format
+from dynx.model.document_format import Format
+from dynx.model.tree import Base
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules.case import Case
 

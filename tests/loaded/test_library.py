@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examination import temporary_urdf, without_meshes
+from dynx.doctor.examination import temporary_document, without_meshes
 from dynx.engines.pinocchio.as_loaded import LoadedPinocchio
 from dynx.errors import DynxError, EngineError
 from dynx.loaded.difference import model_difference
@@ -55,7 +55,7 @@ def test_one_robot_of_the_library_is_left_out() -> None:
 @pytest.mark.parametrize("name", SOURCES)
 def test_pinocchio_loads_it_as_dynx_reads_it(name: str, base: Base) -> None:
     model = in_tree_coordinates(SOURCES[name], base)
-    with temporary_urdf(SOURCES[name]) as path, LoadedPinocchio(path, model) as robot:
+    with temporary_document(SOURCES[name]) as path, LoadedPinocchio(path, model) as robot:
         if model.nv:
             assert_alike(robot, model, solve=False)
         assert model_difference(model, [robot.describe()]) == ()
@@ -72,10 +72,10 @@ def test_pybullet_differs_where_the_model_difference_lists_it(name: str, base: B
     q, v, a = motion(model)
     refusal = _refusal(model)
     if refusal is not None:
-        with temporary_urdf(SOURCES[name]) as path, pytest.raises(EngineError, match=refusal):
+        with temporary_document(SOURCES[name]) as path, pytest.raises(EngineError, match=refusal):
             LoadedPyBullet(path, model)
         return
-    with temporary_urdf(SOURCES[name]) as path, LoadedPyBullet(path, model) as robot:
+    with temporary_document(SOURCES[name]) as path, LoadedPyBullet(path, model) as robot:
         rows = model_difference(model, [robot.describe()])
         poses = reference.forward_kinematics(q)[: len(model.links)]
         assert error(robot.link_poses(q), poses) <= BAR
@@ -103,7 +103,7 @@ def test_some_robots_are_loaded_alike_and_most_are_not() -> None:
     for name in ("ur5", "solo12", "panda", "talos", "g1"):
         model = in_tree_coordinates(SOURCES[name], "fixed")
         q = model.random(0)
-        with temporary_urdf(SOURCES[name]) as path, bullet.LoadedPyBullet(path, model) as robot:
+        with temporary_document(SOURCES[name]) as path, bullet.LoadedPyBullet(path, model) as robot:
             M = ReferenceBackend(model).mass_matrix(q)
             alike.append(bool(np.max(np.abs(robot.mass_matrix(q) - M)) <= BAR * np.max(M)))
     assert alike == [True, True, False, False, False]

@@ -79,7 +79,7 @@ def test_a_path_is_text_too(name: str, tmp_path: Path, monkeypatch: pytest.Monke
     with load_as(name, "robot.urdf", model) as one, load_as(name, tmp_path / "robot.urdf", model) as other:
         assert np.array_equal(one.mass_matrix(q), other.mass_matrix(q))
     for missing in ("robott.urdf", ".", "a\0b"):
-        with pytest.raises(RobotNotFoundError, match="wanted the path of a URDF file"):
+        with pytest.raises(RobotNotFoundError, match="wanted the path of a file in URDF"):
             load_as(name, missing, model)
 
 

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 import dynx
 from dynx.errors import ArgumentError, DescriptionError, UnknownNameError
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model, Pose
-from dynx.model.conversion import Format, convert, robot_differences, shape_differences
+from dynx.model.conversion import convert, robot_differences, shape_differences
+from dynx.model.document_format import Format
 from dynx.model.geometry import (
     Appearance,
     Box,

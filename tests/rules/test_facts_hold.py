@@ -8,6 +8,7 @@ named, right before it. So a release of an engine that behaves otherwise fails h
 from __future__ import annotations
 
 from functools import cache
+from math import isfinite
 from typing import Any
 
 import pytest
@@ -94,8 +95,16 @@ def test_fact(rule: Rule, engine: str) -> None:
     after = examiner(engine).examine(case)
     if after.max_error(engine) > BAR:
         # A remedy may bring up another cause: links without mass between the halves of a split joint.
-        after = examiner(engine).examine(mend(case).case)
-    assert after.max_error(engine) <= BAR, description(after, engine)
+        mended = mend(case).case
+        after = examiner(engine).examine(mended)
+        case = mended
+    # What no edit removes, such as numbers in single precision, is left, up to a bound.
+    left = [
+        other.stated_bound
+        for other in all_rules()
+        if other.stated and engine in other.engines and isfinite(other.stated_bound) and other.detect(case)
+    ]
+    assert after.max_error(engine) <= max(left, default=BAR), description(after, engine)
 
 
 @pytest.mark.parametrize("rule", all_rules(), ids=lambda rule: rule.id)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dynx.doctor.examination import temporary_urdf
+from dynx.doctor.examination import temporary_document
 from dynx.engines.silence import silence
 from dynx.errors import EngineError
 from dynx.loaded import LoadedInertial, LoadedJoint, installed_engines, load_as
@@ -28,7 +28,7 @@ def held(engine: str, old: str, new: str) -> tuple[LoadedInertial, LoadedJoint]:
     """Return the arm and its joint in an engine that loads the sound robot with `new` in place of `old`."""
     text = SOUND.source.text.replace(old, new)
     assert text != SOUND.source.text
-    with temporary_urdf(XmlSource(text)) as path, silence(), load_as(engine, path, SOUND.model) as robot:
+    with temporary_document(XmlSource(text)) as path, silence(), load_as(engine, path, SOUND.model) as robot:
         found = robot.describe()
     return found.links["arm"], found.joints["elbow"]
 

@@ -162,7 +162,7 @@ def _file_name(text: str) -> str:
 
 
 def planned_targets(
-    inputs: Sequence[RobotInput], out: str | None, *, in_place: bool, bases: Sequence[Base]
+    inputs: Sequence[RobotInput], out: str | None, *, in_place: bool, bases: Sequence[Base | None]
 ) -> list[str | None]:
     """Return the file for the mended description of each input on each base, or None."""
     if out is not None and in_place:
@@ -176,7 +176,7 @@ def planned_targets(
     return [*targets(inputs, out, bases)]
 
 
-def targets(inputs: Sequence[RobotInput], out: str, bases: Sequence[Base] = ("fixed",)) -> list[str]:
+def targets(inputs: Sequence[RobotInput], out: str, bases: Sequence[Base | None] = ("fixed",)) -> list[str]:
     """Return the file in `out` for each input on each base; ArgumentError where it is an input or not
     writable.
 

@@ -50,8 +50,8 @@ from dynx.loaded.robot import (
     require_file,
 )
 from dynx.model import Model
+from dynx.model.document_format import Format
 from dynx.model.mechanism import float64, pose_arrays
-from dynx.model.tree import Format
 from dynx.model.xml.source import SourceElement, XmlSource
 from dynx.spatial.inertia import inertia_about_origin
 from dynx.spatial.scalar import Floats
@@ -146,9 +146,11 @@ def describe_joint(joint: Any, actuator: Any | None, form: Format = "urdf") -> L
     A joint of SDF has a frame of its own, so that its axis is given in the frame of the child, and its place
     shows in the poses of links alone.
     """
-    placement, R_child = np.array(joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4()), np.eye(3)
+    placement: Floats | None = np.array(joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4())
+    R_child: Floats = np.eye(3)
     if form == "sdf":
-        placement, R_child = None, joint.frame_on_child().GetFixedPoseInBodyFrame().rotation().matrix()
+        placement = None
+        R_child = joint.frame_on_child().GetFixedPoseInBodyFrame().rotation().matrix()
     kind = str(joint.type_name())
     if joint.num_velocities() != 1:
         return LoadedJoint(kind, placement)

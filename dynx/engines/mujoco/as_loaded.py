@@ -37,7 +37,7 @@ from dynx.loaded.robot import (
     require_file,
 )
 from dynx.model import Model
-from dynx.model.tree import Format
+from dynx.model.document_format import Format
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat

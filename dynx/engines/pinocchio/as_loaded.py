@@ -30,7 +30,7 @@ from dynx.loaded.robot import (
     lacking_joints,
 )
 from dynx.model import Model
-from dynx.model.tree import Format
+from dynx.model.document_format import Format
 from dynx.spatial.scalar import Floats
 
 CALLS: Mapping[str, str] = {"pinocchio.no_armature": "model.armature[:] = 0"}

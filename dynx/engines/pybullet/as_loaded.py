@@ -48,8 +48,8 @@ from dynx.loaded.robot import (
     lacking_joints,
 )
 from dynx.model import Model
+from dynx.model.document_format import Format
 from dynx.model.mechanism import ROOT
-from dynx.model.tree import Format
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
@@ -235,7 +235,7 @@ class LoadedPyBullet(LoadedRobot):
             require_harmless(path, model)
         self._model = model
         fixed, flags = not model.floating, self._flags(calls)
-        reading = {
+        reading: dict[str, Any] = {
             "fixed": fixed,
             "flags": flags,
             "function": _FUNCTIONS[self._form],

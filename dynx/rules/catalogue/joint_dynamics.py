@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import ClassVar
 
 from dynx.errors import DynxError, shown
-from dynx.model.tree import Format
+from dynx.model.document_format import Format
 from dynx.model.xml.source import SourceElement
 from dynx.rules import (
     CallingRule,

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import ClassVar
 
 from dynx.errors import shown
-from dynx.model.tree import Format
+from dynx.model.document_format import Format
 from dynx.rules import CallingRule, Case, Detection, measured_on
 from dynx.rules.mjcf import found_in, mjcf_text, parts_of_bodies
 

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from dynx.errors import shown
+from dynx.model.document_format import Format
 from dynx.model.elements import Inertial
 from dynx.model.mjcf.document import MjcfText
-from dynx.model.tree import Format
 from dynx.model.xml.reading import Element
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Rule, measured_on
@@ -246,36 +246,45 @@ class InertiaNotPrincipal(EditingRule):
                 )
 
 
-class ThreeJointsInBody(Rule):
-    """DX607 three-joints-in-body: A body has three joints or more, which Drake connects otherwise.
+class SeveralJointsInBody(EditingRule):
+    """DX607 several-joints-in-body: A body at some distance from its parent has several joints, which Drake
+    places otherwise.
 
     A body of MJCF may have several joints, which act one after the other: three hinges stand for a wrist.
 
-    - MuJoCo 4.0 and Pinocchio 4.1 read any number. PyBullet 3.2.7 (``loadMJCF``) does where they stand at one
-      point.
-    - Drake 1.51 adds bodies in between, named ``wrist0`` and ``wrist1``. With two joints the poses are those
-      of MuJoCo, with three or more they are not.
+    - MuJoCo 4.0, Pinocchio 4.1 and PyBullet 3.2.7 (``loadMJCF``) place all of them at the body.
+    - Drake 1.51 adds bodies in between, named ``wrist0`` and ``wrist1``. It places all joints but the last at
+      the origin of the parent, and the whole offset of the body (``pos`` and its orientation) behind them. So
+      the body turns about the origin of its parent.
 
     The effect is another pose of the body and of all bodies that it carries.
 
-    What to do: convert the file to URDF or SDF for Drake (``dynx convert --to urdf``), where each joint
-    has links of its own. No edit of the MJCF helps, since MuJoCo refuses bodies without mass that move. So
-    the effect in a report is what remains of the difference without all other causes.
+    What to do: put the body into one without joints, which has its place. ``dynx doctor --fix`` does so.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
-    stated = True
-    advice = "Convert the file to URDF or SDF for Drake (dynx convert --to urdf)."
+    advice = "Put the body into one without joints, which has its place."
     engines = measured_on("drake")
+    changed = "put bodies with several joints into bodies that have their places"
 
-    def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Yield bodies with three joints."""
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield bodies with several joints that are not at their parent."""
         document = mjcf_text(case)
+        taken = {body.name for body in bodies_in_text(case, document)}
         for body in bodies_in_text(case, document):
-            joints = body.children("joint")
-            if len(joints) > 2:
-                message = f"the body has {len(joints)} joints"
-                yield Detection(body.name, None, joints[0].line, message)
+            element, joints = body.element, body.children("joint")
+            place = [name for name in ("pos", *_ORIENTATIONS) if name in element.attributes]
+            at_parent = place == ["pos"] and not any(map(float, element.attributes["pos"].split()))
+            if len(joints) < 2 or not place or at_parent:
+                continue
+            given = "".join(f' {name}="{element.attributes[name]}"' for name in place)
+            outer = f"{body.name}_place"
+            named = f' name="{outer}"' if body.name and outer not in taken else ""
+            edits = [case.source.attribute_removal(element, name) for name in place]
+            edits.append(Edit(element.span.start, element.span.start, f"<body{named}{given}>"))
+            edits.append(Edit(element.span.end, element.span.end, "</body>"))
+            message = f"the body has {len(joints)} joints, and is not at the origin of its parent"
+            yield Correction(Detection(body.name, None, joints[0].line, message), tuple(edits))
 
 
 class FrameOfBodies(Rule):
@@ -505,7 +514,7 @@ class InertiaFromShapesOfMjcf(CallingRule):
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield bodies whose moments are not those of one box that is all their shape."""
         document = mjcf_text(case)
-        boxes = {body.name: _moments_of_box(body, document) for body in bodies_in_text(case, document)}
+        boxes = {body.name: _moments_of_box(body) for body in bodies_in_text(case, document)}
         for link in case.model.links:
             inertial = link.inertial
             if inertial is None or not inertial.mass:
@@ -519,11 +528,12 @@ class InertiaFromShapesOfMjcf(CallingRule):
             yield Detection(link.name, None, link.line, message)
 
 
-def _moments_of_box(body: BodyInText, document: MjcfText) -> Floats | None:
+def _moments_of_box(body: BodyInText) -> Floats | None:
     """Return the moments (3,) of the one box of a body, for 1 kg; None for other shapes, and for a body that
     states no inertial."""
     geoms = body.children("geom", "frame")
-    given = with_defaults(document, geoms[0], body.childclass) if len(geoms) == 1 else {}
+    # PyBullet does not apply classes of defaults to these.
+    given = geoms[0].attributes if len(geoms) == 1 else {}
     stated = body.element.first("inertial") is not None
     if not stated or given.get("type") != "box" or any(name in given for name in _ORIENTATIONS):
         return None

@@ -1,0 +1,175 @@
+"""The doctor on MJCF and SDF: own reading of each engine in a process of its own, lines, causes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import dynx
+from dynx.agreement.tolerances import BAR
+from dynx.doctor.diagnosis import compare_as_loaded, diagnose, open_case
+from dynx.doctor.examination import EngineProcess, EngineTask, Examiner, temporary_document
+from dynx.engines.mujoco.as_loaded import LoadedMujoco
+from dynx.loaded import installed_engines
+from dynx.model import Model
+from dynx.model.xml.source import XmlSource
+from dynx.rules import all_rules
+from dynx.rules.registry import find_trap, trap_case
+
+needs_all = pytest.mark.skipif(len(installed_engines()) < 4, reason="needs all engines")
+
+MJCF_RULES = [rule for rule in all_rules() if rule.formats[0] == "mjcf"]
+
+WITHOUT_CAUSE = {
+    "DX608": "frame",
+    "DX609": '    <body name="table" pos="0 3 0"/>\n',
+    "DX612": 'pos="0.6 0 0"',
+}
+"""What of the trap of each stated omission is its cause."""
+
+SDF = """<sdf version="1.6">
+  <model name="crane">
+    <link name="mast">
+      <pose>0 0 1 0 0 0</pose>
+      <inertial><mass>20</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz></inertia></inertial>
+    </link>
+    <link name="boom">
+      <pose>0 0 1.5 0 0 0</pose>
+      <inertial><mass>5</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz></inertia></inertial>
+    </link>
+    <joint name="foot" type="fixed"><parent>world</parent><child>mast</child></joint>
+    <joint name="turn" type="revolute">
+      <parent>mast</parent><child>boom</child>
+      <axis><xyz>0 0 1</xyz><dynamics><damping>0.5</damping><friction>0.25</friction></dynamics></axis>
+    </joint>
+  </model>
+</sdf>
+"""
+
+
+class Aborting(LoadedMujoco):
+    """An engine that ends its process while it loads a file."""
+
+    def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
+        os.abort()
+
+
+@pytest.mark.parametrize("rule", [each for each in MJCF_RULES if each.stated], ids=lambda rule: rule.id)
+def test_a_stated_omission_is_that_of_the_trap(rule: Any) -> None:
+    """Without its cause the engines that the rule names load the trap as dynx does."""
+    text = trap_case(rule).source.text
+    if rule.id == "DX608":
+        start, end = text.index("        <frame"), text.index("</frame>") + len("</frame>\n")
+        text = text[:start] + text[end:]
+    elif rule.id == "DX612":
+        text = text.replace(WITHOUT_CAUSE[rule.id], 'pos="0.625 0 0"')
+    else:
+        assert WITHOUT_CAUSE[rule.id] in text
+        text = text.replace(WITHOUT_CAUSE[rule.id], "")
+    engines = [name for name in rule.engines if name in installed_engines()]
+    report = compare_as_loaded(text, engines=engines, samples=2)
+    assert report.error is None
+    assert all(each.no_results is None and max(each.before.values()) <= BAR for each in report.engines)
+
+
+@needs_all
+@pytest.mark.parametrize("rule", ["DX309", "DX601", "DX602", "DX605", "DX607", "DX608"])
+def test_the_cause_of_a_trap_is_named_with_its_line(rule: str) -> None:
+    report = diagnose(find_trap(rule), samples=1)
+    assert report.status == "explained", report.unexplained
+    assert report.format == "mjcf"
+    causes = {each.rule: each for each in report.differences}
+    assert rule in causes
+    line = find_trap(rule).read_text().splitlines()[(causes[rule].line or 0) - 1]
+    assert line.strip().startswith("<")
+    stated = next(each.stated for each in MJCF_RULES if each.id == rule)
+    assert causes[rule].proved != stated
+
+
+@needs_all
+def test_what_engines_hold_otherwise_has_the_line_of_the_file() -> None:
+    report = compare_as_loaded(find_trap("DX605"), samples=1)
+    held = {(each.engine, each.property): each for each in report.model_difference}
+    assert not held  # the engine that drops the joint is not used
+    text = trap_case("DX605").source.text.replace('name="elbow"', 'name="elbow" type="hinge" range="-1 1"')
+    report = compare_as_loaded(text, samples=1)
+    (lower,) = [each for each in report.model_difference if each.property == "lower"]
+    assert (lower.engine, lower.name, lower.file, lower.engine_value) == ("pybullet", "elbow", -1.0, None)
+    assert "elbow" in text.splitlines()[(lower.line or 0) - 1]
+
+
+@needs_all
+def test_engines_without_a_reader_take_part_only_where_named() -> None:
+    report = compare_as_loaded(SDF, samples=1)
+    assert [each.engine for each in report.engines] == ["pybullet", "drake"]
+    assert report.base == "fixed"
+    named = compare_as_loaded(SDF, engines=["mujoco", "drake"], samples=1)
+    assert "loads no SDF" in (named.engines[0].not_used or "")
+
+
+@needs_all
+def test_an_sdf_file_is_examined_with_its_causes() -> None:
+    report = diagnose(SDF, engines=["drake"], samples=2)
+    assert report.status == "explained"
+    (cause,) = report.differences
+    assert (cause.rule, cause.joint, cause.proved) == ("DX301", "turn", True)
+    friction = [each for each in report.model_difference if each.property == "friction"]
+    assert [(each.engine, each.file, each.engine_value) for each in friction] == [("drake", 0.25, 0.0)]
+
+
+def test_a_base_that_contradicts_the_file_is_refused() -> None:
+    report = diagnose(find_trap("DX309"), base="floating")
+    assert report.error is not None
+    assert report.error.type == "ArgumentError"
+
+
+def test_an_engine_that_ends_its_process_is_not_used() -> None:
+    if "mujoco" not in installed_engines():
+        pytest.skip("needs MuJoCo")
+    case = open_case(find_trap("DX605"), None, {})
+    examiner = Examiner(["mujoco"], 1, 0)
+    reference = examiner.reference(case)
+    apart = EngineProcess()
+    try:
+        with temporary_document(case.source) as path:
+            tasks = [
+                EngineTask(kind.name, kind, path, frozenset(), reference, False)
+                for kind in (Aborting, LoadedMujoco)
+            ]
+            crashed, sound = apart.evaluate(tasks)
+    finally:
+        apart.close()
+        examiner.close()
+    assert "mujoco" in (crashed.not_used or "")
+    assert sound.no_results is None
+
+
+def test_included_files_are_found_from_the_copy_that_engines_load(tmp_path: Path) -> None:
+    if "mujoco" not in installed_engines():
+        pytest.skip("needs MuJoCo")
+    (tmp_path / "package.xml").write_text("<package/>")
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "defaults.xml").write_text(
+        '<mujocoinclude><default><geom density="500"/></default></mujocoinclude>'
+    )
+    robot = tmp_path / "robots" / "arm.xml"
+    robot.write_text(
+        '<mujoco model="arm">\n<include file="../parts/defaults.xml"/>\n<worldbody><body name="arm">'
+        '<joint name="hinge" type="hinge"/><geom size="0.1"/></body></worldbody>\n</mujoco>\n'
+    )
+    report = compare_as_loaded(robot, engines=["mujoco"], samples=1)
+    assert report.error is None
+    assert report.alike, report.engines
+    assert dynx.load(robot).total_mass == report.total_mass
+
+
+def test_a_copy_keeps_the_format_of_the_document() -> None:
+    for text, suffix in (("<robot/>", ".urdf"), ("<mujoco/>", ".xml"), ("<sdf/>", ".sdf")):
+        with temporary_document(XmlSource(text)) as path:
+            assert path.suffix == suffix
+            assert path.read_text() == text
