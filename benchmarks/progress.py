@@ -34,8 +34,16 @@ class Record(Generic[Row]):
         found = self._known.get(key)
         if found is None:
             found = measure()
-            if self._path is not None:
-                values: Any = found
-                with self._path.open("a", encoding="utf-8") as file:
-                    print(json.dumps(asdict(values)), file=file)
+            self.add(found)
         return found
+
+    def known(self, key: Any) -> Row | None:
+        """Return the row of the file, or None."""
+        return self._known.get(key)
+
+    def add(self, row: Row) -> None:
+        """Add a row to the file."""
+        if self._path is not None:
+            values: Any = row
+            with self._path.open("a", encoding="utf-8") as file:
+                print(json.dumps(asdict(values)), file=file)

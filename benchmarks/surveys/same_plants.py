@@ -1,0 +1,576 @@
+"""Planted differences of 42 kinds for the survey of ``dynx same``, and the elements they change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.surveys.robot_texts import (
+    Format,
+    Inertial,
+    Joint,
+    Link,
+    Robot,
+    Shape,
+    axis_angle,
+    inverse,
+    pose,
+    rotation_from_rpy,
+    write,
+    write_urdf,
+)
+from benchmarks.surveys.robot_truth import line_difference, text_difference
+from benchmarks.surveys.same_rewrites import (
+    TOLERANCE,
+    Rewritten,
+    Row,
+    attribute_words,
+    compare,
+    draw_formats,
+    draw_robot,
+    draw_style,
+    fit_formats,
+    move_frames,
+    random_inertial,
+    reverse_axes,
+    style_words,
+    turn_inertias,
+)
+
+
+@dataclass
+class Planted:
+    """Where a difference was planted: names of the element, and what the report is to call it.
+
+    `part` is a part of an element, "attribute KIND" or "unmatched". `link` and `joint` are accepted names.
+    """
+
+    part: str
+    names: set[str]
+    inertial: bool = False
+    """Whether inertias or joint lines change by the size, so that the null space decides."""
+
+
+class NotHereError(Exception):
+    """The robot has no place for the difference."""
+
+
+Plant = Callable[[Robot, np.random.Generator, float], Planted]
+PLANTS: dict[str, tuple[Plant, tuple[Format, ...]]] = {}
+EVERYWHERE: tuple[Format, ...] = ("urdf", "mjcf", "sdf")
+
+
+def plant(kind: str, formats: tuple[Format, ...] = EVERYWHERE) -> Callable[[Plant], Plant]:
+    """Register a kind of difference, with the formats that can say it."""
+
+    def register(function: Plant) -> Plant:
+        PLANTS[kind] = (function, formats)
+        return function
+
+    return register
+
+
+def _pick(rng: np.random.Generator, items: list[Any]) -> Any:
+    if not items:
+        raise NotHereError
+    return items[int(rng.integers(len(items)))]
+
+
+def _heavy(robot: Robot, rng: np.random.Generator) -> tuple[Link, Inertial, float, float]:
+    """Return a link with mass, its inertia, and the mass and the largest central moment of its body."""
+    link = _pick(
+        rng, [each for each in robot.links.values() if each.inertial is not None and each.inertial.mass > 0.0]
+    )
+    body = robot.body_inertial(link.name)
+    assert body is not None
+    largest = float(np.max(np.abs(np.linalg.eigvalsh(body.tensor))))
+    if largest <= 0.0:
+        raise NotHereError
+    return link, link.inertial, body.mass, largest
+
+
+@plant("mass")
+def _mass(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    link, own, mass, _ = _heavy(robot, rng)
+    own.mass += size * mass
+    return Planted("inertial", {link.name}, True)
+
+
+def _centre(i: int) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        link, own, mass, largest = _heavy(robot, rng)
+        own.com = own.com + own.frame[:, i] * size * np.sqrt(mass * largest) / own.mass
+        return Planted("inertial", {link.name}, True)
+
+    return change
+
+
+def _moment(i: int, j: int) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        link, own, _, largest = _heavy(robot, rng)
+        E = np.zeros((3, 3))
+        E[i, j] = E[j, i] = size * largest
+        own.tensor = own.tensor + own.frame @ E @ own.frame.T
+        return Planted("inertial", {link.name}, True)
+
+    return change
+
+
+for _i in range(3):
+    plant(f"centre {'xyz'[_i]}")(_centre(_i))
+    for _j in range(_i, 3):
+        plant(f"moment {'xyz'[_i]}{'xyz'[_j]}")(_moment(_i, _j))
+
+
+@plant("inertia axes")
+def _inertia_axes(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    link, own, _, _ = _heavy(robot, rng)
+    axis = rng.normal(size=3)
+    R = axis_angle(axis / np.linalg.norm(axis), size)
+    own.tensor = R @ own.tensor @ R.T
+    return Planted("inertial", {link.name}, True)
+
+
+@plant("axis")
+def _axis(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    joint = _pick(rng, [each for each in robot.joints if each.moves])
+    side = np.cross(joint.axis, rng.normal(size=3))
+    joint.axis = axis_angle(side / np.linalg.norm(side), size) @ joint.axis
+    return Planted("axis", {joint.name}, True)
+
+
+def _origin(i: int, turn: bool) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        fixed = rng.random() < 0.2
+        joint = _pick(rng, [each for each in robot.joints if (each.type == "fixed") == fixed])
+        if not joint.moves and joint.type != "fixed":
+            raise NotHereError
+        E = np.eye(3)[i] * size
+        joint.T = joint.T @ pose(rotation_from_rpy(E)) if turn else pose(None, E * robot.reach) @ joint.T
+        names = {joint.name, f"{joint.child}_fixed", joint.child}
+        only_frame = all(robot.links[each].is_empty for each in robot.below(joint))
+        if only_frame and fixed and not any(robot.above(each).moves for each in robot.below(joint)):  # type: ignore[union-attr]
+            return Planted("attribute frame", names | robot.below(joint))
+        return Planted("origin", names, True)
+
+    return change
+
+
+for _i in range(3):
+    plant(f"origin {'xyz'[_i]}")(_origin(_i, False))
+    plant(f"origin {('roll', 'pitch', 'yaw')[_i]}")(_origin(_i, True))
+
+
+@plant("joint type")
+def _type(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    followed = {each.mimic[0] for each in robot.joints if each.mimic is not None}
+    joint = _pick(
+        rng,
+        [each for each in robot.joints if each.moves and each.mimic is None and each.name not in followed],
+    )
+    if joint.type == "prismatic":
+        joint.type = "revolute"
+    else:
+        joint.type = "prismatic" if rng.random() < 0.7 else "fixed"
+        if joint.type == "prismatic" and joint.lower is None:
+            joint.lower, joint.upper = -1.0, 1.0
+    return Planted("type", {joint.name, joint.child, f"{joint.child}_fixed"})
+
+
+def _limit(name: str, kind: str) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        joint = _pick(rng, [each for each in robot.joints if each.moves and getattr(each, name)])
+        value = getattr(joint, name)
+        outwards = -1.0 if name == "lower" else 1.0
+        setattr(joint, name, value + outwards * size * abs(value))
+        return Planted(f"attribute {kind}", {joint.name})
+
+    return change
+
+
+for _name, _kind in (("lower", "lower limit"), ("upper", "upper limit"), ("effort", "effort limit")):
+    plant(_kind)(_limit(_name, _kind))
+plant("velocity limit", ("urdf", "sdf"))(_limit("velocity", "velocity limit"))
+
+
+def _dynamics(name: str) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        joint = _pick(rng, [each for each in robot.joints if each.moves])
+        value = float(getattr(joint, name))
+        setattr(joint, name, value + size * (value or 1.0))
+        return Planted(f"attribute {name}", {joint.name})
+
+    return change
+
+
+plant("damping")(_dynamics("damping"))
+plant("friction")(_dynamics("friction"))
+plant("armature", ("mjcf",))(_dynamics("armature"))
+
+
+def _mimic(offset: bool) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        joint = _pick(rng, [each for each in robot.joints if each.moves and each.mimic is not None])
+        leader, m, o = joint.mimic
+        joint.mimic = (leader, m, o + size) if offset else (leader, m + size * (abs(m) or 1.0), o)
+        return Planted("mimic", {joint.name})
+
+    return change
+
+
+plant("mimic factor", ("urdf", "sdf"))(_mimic(False))
+plant("mimic offset", ("urdf", "sdf"))(_mimic(True))
+
+
+def _shape(robot: Robot, rng: np.random.Generator, kinds: tuple[str, ...]) -> tuple[Link, Shape, str]:
+    found = [(link, shape) for link in robot.links.values() for shape in link.shapes if shape.kind in kinds]
+    link, shape = _pick(rng, found)
+    return link, shape, "attribute visual shapes" if shape.visual else "attribute collision shapes"
+
+
+@plant("shape size")
+def _shape_size(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    link, shape, kind = _shape(robot, rng, ("box", "sphere", "cylinder", "mesh"))
+    sizes = list(shape.size)
+    i = int(rng.integers(len(sizes)))
+    sizes[i] *= 1.0 + size
+    shape.size = tuple(sizes)
+    return Planted(kind, robot.body(link.name))
+
+
+@plant("shape pose")
+def _shape_pose(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    link, shape, kind = _shape(robot, rng, ("box", "sphere", "cylinder", "mesh"))
+    if shape.kind == "sphere" or rng.random() < 0.5:
+        shape.T = pose(None, np.eye(3)[rng.integers(3)] * size * robot.reach) @ shape.T
+    else:  # about x, which turns a cylinder as well
+        shape.T = shape.T @ pose(axis_angle(np.array([1.0, 0.0, 0.0]), size))
+    return Planted(kind, robot.body(link.name))
+
+
+@plant("shape kind")
+def _shape_kind(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    link, shape, kind = _shape(robot, rng, ("box", "sphere", "cylinder"))
+    shape.kind, shape.size = {
+        "box": ("cylinder", (shape.size[0] / 2, shape.size[-1])),
+        "sphere": ("box", (shape.size[0] * 2,) * 3),
+        "cylinder": ("box", (shape.size[0] * 2, shape.size[0] * 2, shape.size[-1])),
+    }[shape.kind]
+    return Planted(kind, robot.body(link.name))
+
+
+@plant("shape missing")
+def _shape_missing(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    link, shape, kind = _shape(robot, rng, ("box", "sphere", "cylinder", "mesh"))
+    link.shapes = [each for each in link.shapes if each is not shape]
+    return Planted(kind, robot.body(link.name))
+
+
+@plant("mesh file", ("urdf",))
+def _mesh_file(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    link, shape, kind = _shape(robot, rng, ("mesh",))
+    path, _, end = shape.file.rpartition(".")
+    shape.file = f"{path}_other.{end}"
+    return Planted(kind, robot.body(link.name))
+
+
+@plant("contact filter", ("mjcf",))
+def _filter(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    if rng.random() < 0.5:
+        names = [name for name, link in robot.links.items() if any(not each.visual for each in link.shapes)]
+        pairs = [
+            (a, b) for a in names for b in names if a < b and b not in robot.body(a) and "world" not in (a, b)
+        ]
+        pair = _pick(rng, pairs)
+        robot.exclusions.append(pair)
+        return Planted("attribute contact filter", set(pair))
+    found = [(link, each) for link in robot.links.values() for each in link.shapes if not each.visual]
+    link, shape = _pick(rng, found)
+    shape.filter = 3
+    return Planted("attribute contact filter", robot.body(link.name))
+
+
+@plant("actuator gear", ("mjcf",))
+def _gear(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    joint = _pick(rng, [each for each in robot.joints if each.moves])
+    joint.gear = 1.0 + size
+    return Planted("attribute actuator", {joint.name, "motor_" + joint.name})
+
+
+@plant("link missing")
+def _missing(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    followed = {each.mimic[0] for each in robot.joints if each.mimic is not None}
+    joint = _pick(
+        rng,
+        [
+            each
+            for each in robot.joints
+            if each.moves and each.name not in followed and not robot.children(each.child)
+        ],
+    )
+    if sum(each.moves for each in robot.joints) < 2:
+        raise NotHereError
+    robot.joints = [each for each in robot.joints if each is not joint]
+    del robot.links[joint.child]
+    return Planted("unmatched", {joint.name})
+
+
+@plant("link added")
+def _added(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    parent = _pick(rng, [name for name in robot.links if name != "world" and not robot.links[name].is_empty])
+    robot.links["planted"] = Link("planted", random_inertial(rng, 0.1))
+    T = pose(None, rng.uniform(-0.2, 0.2, 3))
+    robot.joints.append(
+        Joint("planted_joint", "revolute", parent, "planted", T, np.eye(3)[2], -1.0, 1.0, 1.0, 1.0)
+    )
+    return Planted("unmatched", {"planted_joint"})
+
+
+@plant("held link missing")
+def _held_missing(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    found = []
+    for each in robot.joints:
+        own = robot.links[each.child].inertial
+        if each.type == "fixed" and own is not None and own.mass > 0.0 and not robot.children(each.child):
+            found.append(each)
+    joint = _pick(rng, found)
+    names = robot.body(joint.child)
+    robot.joints = [each for each in robot.joints if each is not joint]
+    del robot.links[joint.child]
+    return Planted("inertial", names, True)
+
+
+@plant("parent exchanged")
+def _parent(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    joint = _pick(rng, [each for each in robot.joints if each.moves])
+    taken = robot.below(joint) | robot.body(joint.parent)
+    parent = _pick(
+        rng, [name for name, link in robot.links.items() if name not in taken and not link.is_empty]
+    )
+    poses = robot.poses()
+    joint.T = inverse(poses[parent]) @ poses[joint.child]
+    joint.parent = parent
+    return Planted("unmatched", {joint.name})
+
+
+@plant("joint name")
+def _joint_name(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    joint = _pick(rng, [each for each in robot.joints if each.moves])
+    old, joint.name = joint.name, "renamed_joint"
+    for each in robot.joints:
+        if each.mimic is not None and each.mimic[0] == old:
+            each.mimic = (joint.name, *each.mimic[1:])
+    return Planted("attribute name", {old, joint.name})
+
+
+@plant("link name")
+def _link_name(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    name = _pick(rng, [each for each, link in robot.links.items() if each != "world" and not link.is_empty])
+    robot.links = {("renamed_link" if each == name else each): link for each, link in robot.links.items()}
+    robot.links["renamed_link"].name = "renamed_link"
+    for joint in robot.joints:
+        joint.parent = "renamed_link" if joint.parent == name else joint.parent
+        joint.child = "renamed_link" if joint.child == name else joint.child
+    return Planted("attribute name", {name, "renamed_link"})
+
+
+@plant("frame place")
+def _frame(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    found = [each for each in robot.joints if each.type == "fixed" and robot.links[each.child].is_empty]
+    joint = _pick(rng, [each for each in found if not robot.children(each.child)])
+    joint.T = pose(None, np.eye(3)[rng.integers(3)] * size * robot.reach) @ joint.T
+    return Planted("attribute frame", {joint.child, joint.name})
+
+
+def seen_size(before: Robot, after: Robot, floating: bool, seed: int) -> tuple[float, float]:
+    """Return the differences that Pinocchio sees, and that of the joint lines."""
+    texts = write_urdf(before), write_urdf(after)
+    seen = text_difference((before, texts[0], "urdf"), (after, texts[1], "urdf"), floating, seed)
+    return seen, line_difference(before, after)
+
+
+PAIRS: tuple[tuple[Format, Format], ...] = (
+    ("urdf", "urdf"),
+    ("mjcf", "mjcf"),
+    ("sdf", "sdf"),
+    ("urdf", "mjcf"),
+    ("urdf", "sdf"),
+    ("mjcf", "urdf"),
+)
+SEEN = 1e-10
+"""Relative change of torques or joint lines from which a difference is to be found."""
+NULL = 1e-11
+"""Change that a difference of size 1e-2 in the null space has at most: rounding of the engines."""
+
+
+def plant_row(seed: int) -> Row:
+    """Return the row of a planted difference; the kind goes round with the seed."""
+    rng = np.random.default_rng([2, seed])
+    kind = list(PLANTS)[seed % len(PLANTS)]
+    change, possible = PLANTS[kind]
+    while True:
+        name, robot, text, floating = draw_robot(rng)
+        pairs = [pair for pair in PAIRS if set(pair) <= set(possible)]
+        weights = [
+            {("urdf", "urdf"): 6.0, ("mjcf", "mjcf"): 1.5, ("sdf", "sdf"): 1.0}.get(pair, 0.7)
+            for pair in pairs
+        ]
+        formats = draw_formats(rng, pairs, weights)
+        if fit_formats(robot, set(formats)):
+            continue
+        if kind == "actuator gear":
+            for joint in robot.joints:
+                joint.gear = 1.0 if joint.moves else None
+        size = float(10.0 ** rng.uniform(-9, 0))
+        draws = int(rng.integers(2**32))
+        after = robot.copy()
+        try:
+            planted = change(after, np.random.default_rng(draws), size)
+        except NotHereError:
+            continue
+        it = Rewritten(after.copy())
+        steps = [step for step in (move_frames, turn_inertias, reverse_axes) if rng.random() < 0.25]
+        if kind == "link missing" or kind == "link added":
+            steps = []
+        for step in steps:
+            step(it, rng, floating)
+        style = draw_style(rng)
+        original = formats == ("urdf", "urdf") and text is not None and rng.random() < 0.6
+        try:
+            first = text if original and text is not None else write(robot, formats[0], floating)
+            second = write(it.robot, formats[1], floating, style)
+        except ValueError:
+            continue
+        truth, expected = "stated", planted.part
+        if planted.inertial and kind != "held link missing":
+            try:  # amplified, so that rounding does not hide which space it is in
+                large = robot.copy()
+                change(large, np.random.default_rng(draws), max(size, 1e-2))
+                seen, moved = seen_size(robot, large, floating, seed)
+                ratio = size / max(size, 1e-2)
+                truth = f"torque {seen * ratio:.1e}, lines {moved * ratio:.1e}"
+                if max(seen, moved) < NULL:
+                    expected = "null space"
+                elif max(seen, moved) * ratio < SEEN:
+                    continue  # below what has to be found
+            except Exception as error:
+                truth = f"unchecked: {str(error).splitlines()[0][:80]}"
+        elif planted.inertial:
+            try:
+                seen = _held_size(robot, after, floating, seed)
+                truth = f"torque {seen:.1e}"
+                if seen < 1e-12:
+                    expected = "null space"
+                elif seen < SEEN:
+                    continue
+            except Exception as error:
+                truth = f"unchecked: {str(error).splitlines()[0][:80]}"
+        break
+    base = "floating" if floating else "fixed"
+    seconds = 0.0
+    try:
+        report, seconds = compare(first, second, base if set(formats) == {"urdf"} else None, TOLERANCE)
+        outcome = judged(
+            report, planted, expected, (robot, first, formats[0]), (after, it), formats[1], floating, seed
+        )
+    except Exception as error:
+        outcome = f"error: {type(error).__name__}: {str(error)[:300]}"
+    words = ", ".join([kind, *(step.__name__ for step in steps), *style_words(style)])
+    return Row(
+        seed,
+        f"{name} {base}",
+        "-".join(formats),
+        words,
+        size,
+        f"{expected} {sorted(planted.names)[:4]}",
+        outcome,
+        truth,
+        round(seconds, 3),
+    )
+
+
+def _held_size(before: Robot, after: Robot, floating: bool, seed: int) -> float:
+    return seen_size(before, after, floating, seed)[0]
+
+
+def judged(
+    report: Any,
+    planted: Planted,
+    expected: str,
+    a: tuple[Robot, str, Format],
+    b: tuple[Robot, Rewritten],
+    to: Format,
+    floating: bool,
+    seed: int,
+) -> str:
+    """Return "right", or in which way the report is not."""
+    elements = [
+        f"{each.tag} {each.ours}/{each.theirs} {each.part} {each.size:.1e}" for each in report.differences
+    ]
+    unmatched = [f"{each.kind} {each.ours}/{each.theirs}" for each in report.unmatched]
+    attributes = attribute_words(report)
+    told = "; ".join([*elements, *unmatched, *attributes])[:300] or "nothing"
+    if expected == "null space":
+        if report.same and not elements and not unmatched:
+            return "right (null space)"
+        places = [
+            {each.ours, each.theirs} & planted.names for each in report.differences if each.part == "origin"
+        ]
+        if planted.part == "origin" and len(elements) == 1 and any(places) and not unmatched:
+            return "right (no torque shows it; the joint's place is named)"
+        return f"false: {told}"
+    if expected.startswith("attribute"):
+        kind = expected.removeprefix("attribute ")
+        kinds = (
+            {kind, "upper limit", "lower limit"}
+            if kind in ("lower limit", "upper limit") and b[1].signs
+            else {kind}
+        )
+        named = [
+            each
+            for each in report.attributes
+            if each.kind in kinds and {each.ours, each.theirs} & planted.names
+        ]
+        if not named:
+            return f"missed: {told}"
+        if elements or unmatched or not report.same:
+            return f"false: {told}"
+        return "right" if len(named) == len(report.attributes) else f"extra: {told}"
+    if report.same:
+        return f"missed: {told}"
+    if expected == "unmatched" or (expected == "type" and unmatched):
+        named = [each for each in report.unmatched if {each.ours, each.theirs} & planted.names]
+        return "right" if named and len(named) == len(report.unmatched) else f"misnamed: {told}"
+    if unmatched:
+        return f"misnamed: {told}"
+    named = [
+        each
+        for each in report.differences
+        if {each.ours, each.theirs} & planted.names and (each.part == expected or len(planted.names) > 4)
+    ]
+    if expected == "type" and all({each.ours, each.theirs} & planted.names for each in report.differences):
+        # A frame that was moved across the slide does not lie on the axis of the joint that turns.
+        return "right"
+    if named and len(report.differences) == 1:
+        return "right" if not attributes else f"right, extra: {told}"
+    if len(report.differences) == 1 and report.mended_text is not None:
+        other = _mended_difference(a, b[1], report.mended_text.decode(), to, floating, seed)
+        if other < 1e-5:
+            return f"right (equivalent): {told}"
+        return f"misnamed: {told}; its mended file differs by {other:.1e}"
+    return f"misnamed: {told}"
+
+
+def _mended_difference(
+    a: tuple[Robot, str, Format], it: Rewritten, mended: str, to: Format, floating: bool, seed: int
+) -> float:
+    try:
+        return text_difference(a, (it.robot, mended, to), floating, seed, it.signs, it.names, it.T_root)
+    except Exception:
+        return float("inf")
+
+
+__all__ = ["PLANTS", "Planted", "judged", "plant_row"]
