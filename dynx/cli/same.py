@@ -49,18 +49,23 @@ def same(
 ) -> int:
     """Compare two descriptions; return the exit code."""
     check_json(json_path)
+    read = _files_read(first, second) if fix is not None or json_path not in (None, "-") else []
+    if json_path is not None and json_path != "-":
+        require_apart([json_path], read, "a file that is read")
+        if fix is not None and os.path.realpath(json_path) == os.path.realpath(fix):
+            raise ArgumentError(f"--json {shown(json_path, 300)} is also that of --fix; wanted another file")
     if fix is not None:
-        _check_output(fix, first, second)
+        check_writable(fix)
+        require_apart([fix], read, "a file that is read")
+        _check_suffix(fix, second)
     report = same_robot(first, second, base=base, tolerance=TOLERANCE if tolerance is None else tolerance)
     written = None if fix is None else failure_of(_write_mended, report, fix)
     error = present(report.to_dict(), show, json_path)
     return exit_code(error, written, negative=not report.same)
 
 
-def _check_output(path: str, first: str, second: str) -> None:
-    """Raise ArgumentError for a file that cannot be written, is read, or has the suffix of another format
-    than the second robot."""
-    check_writable(path)
+def _files_read(first: str, second: str) -> list[str]:
+    """Return the files of both robots, and those that they include."""
     read: list[str] = []
     for robot in (first, second):
         data, source, _ = read_description(robot)
@@ -68,8 +73,13 @@ def _check_output(path: str, first: str, second: str) -> None:
         folder = os.path.dirname(source)
         included = [each.attributes.get("file", "") for each in root.walk() if each.tag == "include"]
         read += [split_arguments(robot)[0], source, *(os.path.join(folder, name) for name in included)]
-    require_apart([path], read, "a file that is read")
-    format_ = FORMATS.get(root.tag)
+    return read
+
+
+def _check_suffix(path: str, second: str) -> None:
+    """Raise ArgumentError for a file that has the suffix of another format than the second robot."""
+    data, source, _ = read_description(second)
+    format_ = FORMATS.get(XmlSource(data, source).root.tag)
     # Other formats are compared and not mended; the report says so.
     if format_ is None:
         return

@@ -68,17 +68,8 @@ class Coordinate:
 
 
 @dataclass(frozen=True)
-class SameReport:
-    """Whether two descriptions are those of one robot, and what differs.
-
-    `first` and `second` are the names that the caller gave, the sources where they were read from.
-    `differences` are the fewest elements of the second description that make it the same when replaced,
-    `unmatched` what cannot be mended by replacing elements. `attributes` are listed apart from the verdict,
-    `freedoms` are differences of the descriptions and not of the robots. `bounds` hold for robots that are
-    the same. `mended` is the second robot with the differences removed; `mended_text` the bytes of its file,
-    None where nothing is to be mended or `not_mended` says why not. `T_first_second` (4, 4) is the pose of
-    the second robot's base frame in the first's, for floating bases.
-    """
+class _Comparison:
+    """Fields that a report and its document share."""
 
     first: str
     second: str
@@ -92,10 +83,25 @@ class SameReport:
     freedoms: tuple[DescriptionFreedom, ...]
     coordinates: tuple[Coordinate, ...]
     bounds: Bounds | None
-    T_first_second: Floats | None
     notes: tuple[str, ...]
     seconds: float
-    not_mended: str | None = None
+    not_mended: str | None
+
+
+@dataclass(frozen=True)
+class SameReport(_Comparison):
+    """Whether two descriptions are those of one robot, and what differs.
+
+    `first` and `second` are the names that the caller gave, the sources where they were read from.
+    `differences` are the fewest elements of the second description that make it the same when replaced,
+    `unmatched` what cannot be mended by replacing elements. `attributes` are listed apart from the verdict,
+    `freedoms` are differences of the descriptions and not of the robots. `bounds` hold for robots that are
+    the same. `mended` is the second robot with the differences removed; `mended_text` the bytes of its file,
+    None where nothing is to be mended or `not_mended` says why not. `T_first_second` (4, 4) is the pose of
+    the second robot's base frame in the first's, for floating bases.
+    """
+
+    T_first_second: Floats | None
     mended: Model | None = field(default=None, repr=False)
     mended_text: bytes | None = field(default=None, repr=False)
 
@@ -146,26 +152,11 @@ class SameReport:
 
 
 @dataclass(frozen=True)
-class SameDocument:
+class SameDocument(_Comparison):
     """The JSON document of ``dynx same``."""
 
-    first: str
-    second: str
-    first_source: str
-    second_source: str
-    same: bool
     verdict: str
-    tolerance: float
-    differences: tuple[ElementDifference, ...]
-    unmatched: tuple[Unmatched, ...]
-    attributes: tuple[Attribute, ...]
-    freedoms: tuple[DescriptionFreedom, ...]
-    coordinates: tuple[Coordinate, ...]
-    bounds: Bounds | None
     T_first_second: tuple[tuple[float, ...], ...] | None
-    notes: tuple[str, ...]
-    seconds: float
-    not_mended: str | None
     schema: Literal["dynx.same/1"] = SCHEMA
     dynx: str = __version__
 

@@ -183,3 +183,20 @@ def test_unusable_input(tmp_path: Path) -> None:
         result = run(*arguments)
         assert result.exit_code == 2
         assert said in result.stderr
+
+
+def test_the_document_does_not_replace_a_file_that_is_read_or_mended(changed: Path, tmp_path: Path) -> None:
+    before = changed.read_bytes()
+    result = run("ur5", changed, "--json", changed)
+    assert result.exit_code == 2
+    assert "a file that is read" in result.output
+    assert changed.read_bytes() == before
+    out, link = tmp_path / "mended.urdf", tmp_path / "link"
+    link.symlink_to(out)
+    for name in (out, link):
+        result = run("ur5", changed, "--fix", out, "--json", name)
+        assert result.exit_code == 2
+        assert "--fix" in result.output
+        assert not out.exists()
+    # A robot beside itself is no output.
+    assert run(changed, changed, "--fix", out, "--json", tmp_path / "same.json").exit_code == 0
