@@ -53,8 +53,8 @@ class Body:
 
     @property
     def about_z(self) -> bool:
-        """True if the body rotates about the z axis of its joint frame."""
-        return self.revolute and all(self.axis == (0, 0, 1))
+        """True if the body rotates about the z axis of its joint frame; False if it stands for several."""
+        return self.revolute and self.axis.ndim == 1 and all(self.axis == (0, 0, 1))
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,12 @@ from dynx.model.elements import Joint
 from dynx.model.geometry.links import Collision, Visual
 from dynx.model.geometry.mesh import Mesh
 from dynx.model.mechanism import ROOT
+from dynx.model.numbers import is_real
 from dynx.same.decimals import rounded
 from dynx.same.elements import pose_text, vector_text
 from dynx.same.fit import BodyFit, Fit, angle_of
 from dynx.same.limits import differs, limit_differences
-from dynx.spatial.scalar import Array
+from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 
 Kind = Literal[
@@ -39,8 +40,8 @@ Kind = Literal[
     "base pose",
 ]
 
-DIGITS = 9
-"""Significant digits in which the sizes of shapes are compared."""
+DIGITS = 12
+"""Significant digits in which the sizes of shapes are written."""
 
 NEGLIGIBLE = 1e-12
 """Distance [m] or angle [rad] below which two frames are the same."""
@@ -129,23 +130,15 @@ def _of_shapes(
 ) -> Iterator[Attribute]:
     """Compare the shapes of a body, wherever in its links they are; meshes by their names and scales."""
     mine = _shapes(kind, ours, found.ours.links[each.ours], found, None)
-    others = _shapes(kind, theirs, found.theirs.links[each.theirs], found, each)
-    length = found.ours.reach
-    left = list(others)
+    left = _shapes(kind, theirs, found.theirs.links[each.theirs], found, each)
+    limit = max(tolerance, NEGLIGIBLE)
     unmatched = []
-    for text, T in mine:
-        same = next(
-            (
-                k
-                for k, (other, S) in enumerate(left)
-                if other == text and _close(T, S, max(tolerance, NEGLIGIBLE) * max(length, 1.0))
-            ),
-            None,
-        )
+    for shape in mine:
+        same = next((other for other in left if shape.equals(other, limit, found.ours.reach)), None)
         if same is None:
-            unmatched.append(text)
+            unmatched.append(shape.words)
         else:
-            left.pop(same)
+            left = [other for other in left if other is not same]
     if unmatched or left:
         names = [
             model.links[numbers[0]]
@@ -154,17 +147,38 @@ def _of_shapes(
                 (theirs, found.theirs.links[each.theirs]),
             )
         ]
-        first, second = (", ".join(sorted(texts)) or "none" for texts in (unmatched, [t for t, _ in left]))
+        first, second = (
+            ", ".join(sorted(words)) or "none" for words in (unmatched, [shape.words for shape in left])
+        )
         if first == second:
             second = f"placed otherwise: {second}"
         lines = names[0].line, names[1].line
         yield Attribute(kind, "link", names[0].name, names[1].name, first, second, *lines)
 
 
+@dataclass(frozen=True)
+class _PlacedShape:
+    """A shape with its pose T (4, 4) in the frame of our body: what is equal or not, and what is as large."""
+
+    kind: tuple[object, ...]
+    sizes: Floats
+    T: Floats
+    words: str
+
+    def equals(self, other: _PlacedShape, tolerance: float, length: float) -> bool:
+        """Check whether two shapes differ by at most `tolerance` of their sizes, of `length` and of 1 rad."""
+        if self.kind != other.kind or self.sizes.shape != other.sizes.shape:
+            return False
+        if np.any(np.abs(self.sizes - other.sizes) > tolerance * np.abs(self.sizes)):
+            return False
+        apart = np.abs(self.T - other.T)[:3]
+        return bool(np.max(apart[:, :3]) <= tolerance and np.max(apart[:, 3]) <= tolerance * length)
+
+
 def _shapes(
     kind: str, model: Model, links: list[int], found: Fit, each: BodyFit | None
-) -> list[tuple[str, Array]]:
-    """Return the shapes of some links as words, with their poses in the frame of our body."""
+) -> list[_PlacedShape]:
+    """Return the shapes of some links with their poses in the frame of our body."""
     shapes = []
     skeleton = found.ours if each is None else found.theirs
     for number in links:
@@ -176,39 +190,45 @@ def _shapes(
                 else model.geometry.visuals(name)
             )
         except DescriptionError as error:
-            shapes.append((f"a fault ({error.message})", np.eye(4)))
+            words = f"a fault ({error.message})"
+            shapes.append(_PlacedShape((words,), np.zeros(0), np.eye(4), words))
             continue
         if not placed:
             continue
         T = rounded(skeleton.link_pose(number))
         if each is not None:
             T = rounded(each.D) @ T
-        shapes += [(_words(shape), T @ shape.origin.matrix) for shape in placed]
+        shapes += [_placed_shape(shape, T @ shape.origin.matrix) for shape in placed]
     return shapes
 
 
-def _words(placed: Visual | Collision) -> str:
+def _placed_shape(placed: Visual | Collision, T: Floats) -> _PlacedShape:
+    """Take a shape apart; a mesh is its file's name and its scale."""
     shape = placed.shape
     if isinstance(shape, Mesh):
         scale = "" if shape.scale == (1.0, 1.0, 1.0) else f" scaled by {vector_text(shape.scale, DIGITS)}"
-        return f"mesh {PurePath(shape.name).name}{scale}"
-    sizes = ", ".join(
-        f"{name} {vector_text(value, DIGITS) if isinstance(value, tuple) else format(value, f'.{DIGITS}g')}"
-        for name, value in vars(shape).items()
-        if not isinstance(value, tuple) or len(value) <= 3
-    )
-    return f"{type(shape).__name__.lower()}{' ' + sizes if sizes else ''}"
-
-
-def _close(T: Array, S: Array, tolerance: float) -> bool:
-    return bool(np.max(np.abs(T - S)) <= tolerance)
+        name = PurePath(shape.name).name
+        return _PlacedShape(("mesh", name), np.array(shape.scale), T, f"mesh {name}{scale}")
+    kind: list[object] = [type(shape).__name__.lower()]
+    sizes: list[float] = []
+    words = []
+    for name, value in vars(shape).items():
+        numbers = value if isinstance(value, tuple) else (value,)
+        if len(numbers) > 3 or not all(is_real(number) for number in numbers):
+            kind += [name, value]
+            continue
+        sizes += [float(number) for number in numbers]
+        words.append(f"{name} {vector_text(map(float, numbers), DIGITS)}")
+    text = " ".join([str(kind[0]), ", ".join(words)]).strip()
+    return _PlacedShape(tuple(kind), np.array(sizes), T, text)
 
 
 def frame_differences(
     ours: Model, theirs: Model, found: Fit, tolerance: float
 ) -> Iterator[Attribute | DescriptionFreedom]:
-    """Yield frames of one name that stand elsewhere: as a freedom where the whole body is described in
-    another frame, as a difference where the frame alone is moved."""
+    """Yield frames of one name that stand elsewhere. It is a freedom where the frame is that of a joint's
+    link, or of a link with mass or shapes, which are where they were; a difference where it only names a
+    place."""
     fits = {each.theirs: each for each in found.bodies}
     mine = {frame.name: frame for frame in found.ours.mechanism.frames}
     for frame in found.theirs.mechanism.frames:
@@ -225,8 +245,10 @@ def frame_differences(
             for size, words in ((turn, f"turned by {turn:.6g} rad"), (shift, f"moved by {shift:.6g} m"))
             if size > NEGLIGIBLE
         )
-        is_body = _belongs_to_joint(frame.name, found, each)
-        if is_body or max(each.frame_turn, each.frame_shift) > NEGLIGIBLE:
+        is_body = _belongs_to_joint(frame.name, found, each) or not any(
+            _only_names_a_place(model, frame.name) for model in (ours, theirs)
+        )
+        if is_body:
             yield DescriptionFreedom("frame", frame.name, frame.name, f"frame of {frame.name} {moved}")
         else:
             lines = _line(ours, frame.name), _line(theirs, frame.name)
@@ -235,6 +257,19 @@ def frame_differences(
 
 def _belongs_to_joint(name: str, found: Fit, each: BodyFit) -> bool:
     return each.theirs != ROOT and found.theirs.joints[each.theirs].child == name
+
+
+def _only_names_a_place(model: Model, frame: str) -> bool:
+    """Check whether a frame has no mass and no shape."""
+    if all(link.name != frame for link in model.links):
+        return True
+    inertial = model.inertial(frame)
+    if inertial.mass or inertial.tensor.any():
+        return False
+    try:
+        return not (model.geometry.collisions(frame) or model.geometry.visuals(frame))
+    except DescriptionError:  # a fault in a shape: there is one
+        return False
 
 
 def _line(model: Model, frame: str) -> int | None:

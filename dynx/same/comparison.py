@@ -20,7 +20,7 @@ from dynx.model.xml.source import XmlSource
 from dynx.same.attributes import Attribute, DescriptionFreedom, attributes, frame_differences, freedoms
 from dynx.same.bounds import bounds
 from dynx.same.decimals import fifty_digits, rounded
-from dynx.same.effects import ElementEffect, Values, values
+from dynx.same.effects import ElementEffect, values, values_of_variants
 from dynx.same.elements import (
     PARTS,
     Analysis,
@@ -28,6 +28,7 @@ from dynx.same.elements import (
     FieldChange,
     analyse,
     apply,
+    are_equal,
     inertial_text,
     pose_text,
     vector_text,
@@ -35,7 +36,7 @@ from dynx.same.elements import (
 from dynx.same.fit import Fit
 from dynx.same.mending import NotMendedError, mended_text
 from dynx.same.report import Coordinate, ElementDifference, SameReport, Unmatched
-from dynx.same.skeleton import without_standing_mimics
+from dynx.same.skeleton import Skeleton, exact_skeleton, without_standing_mimics
 
 Robot = StrPath | bytes | bytearray | Model
 
@@ -113,12 +114,13 @@ def same_robot(
     first, second = _read(a, base, folders), _read(b, base, folders)
     first, second, notes, unmatched = _with_one_base(first, second)
     ours, theirs = (without_standing_mimics(each.model) for each in (first, second))
-    analysis = analyse(ours, theirs, tolerance)
+    skeleton = exact_skeleton(ours)
+    analysis = analyse(skeleton, theirs, tolerance)
     unmatched += _unmatched(analysis.fit)
     same = analysis.equal and not unmatched
     mended, text, reason = None, None, None
     if not same:
-        mended, text, reason = _mended(second, ours, theirs, analysis, unmatched, tolerance)
+        mended, text, reason = _mended(second, skeleton, theirs, analysis, unmatched, tolerance)
     differences = _differences(analysis, first, second)
     with fifty_digits():
         apart = list(attributes(first.model, second.model, analysis.fit, max(tolerance, 1e-15)))
@@ -247,25 +249,29 @@ def _value_text(change: FieldChange) -> str:
 
 def _effects(analysis: Analysis, theirs: Model) -> list[ElementEffect | None]:
     """Put each element back alone, as it is in `theirs`, into the robot with all of them replaced."""
-    if not analysis.elements:
-        return []
-    mended = apply(theirs, (change for each in analysis.elements for change in each.changes))
+    elements = analysis.elements
+    effects: list[ElementEffect | None] = [None] * len(elements)
+    if not elements:
+        return effects
+    mended = apply(theirs, (change for each in elements for change in each.changes))
+    variants = {k: _put_back(mended, theirs, each) for k, each in enumerate(elements[:MAX_EFFECTS])}
+    together = [k for k in variants if elements[k].part in ("origin", "axis", "inertial")]
     try:
-        right = values(mended, mended)
-        return [
-            _effect(right, mended, theirs, element) if k < MAX_EFFECTS else None
-            for k, element in enumerate(analysis.elements)
-        ]
+        right, *others = values_of_variants([mended, *(variants[k] for k in together)], mended)
+        found = dict(zip(together, others, strict=True))
+        for k, variant in variants.items():
+            effects[k] = right.effect_of(found[k] if k in found else values(variant, mended))
     except DynxError:  # a robot that no backend can evaluate, such as one without links that move
-        return [None] * len(analysis.elements)
+        return [None] * len(elements)
+    return effects
 
 
-def _effect(right: Values, mended: Model, theirs: Model, element: DifferingElement) -> ElementEffect | None:
+def _put_back(mended: Model, theirs: Model, element: DifferingElement) -> Model:
     changes = []
     for change in element.changes:
         part = theirs.joint(change.name) if change.tag == "joint" else theirs.link(change.name)
         changes.append(replace(change, value=getattr(part, change.field)))
-    return right.effect_of(values(apply(mended, changes), mended))
+    return apply(mended, changes)
 
 
 def _unseen(analysis: Analysis) -> list[DescriptionFreedom]:
@@ -304,7 +310,7 @@ def _coordinates(found: Fit) -> tuple[Coordinate, ...]:
 
 def _mended(
     second: _Loaded,
-    ours: Model,
+    ours: Skeleton,
     theirs: Model,
     analysis: Analysis,
     unmatched: list[Unmatched],
@@ -317,7 +323,7 @@ def _mended(
         return None, None, "the kind of the base is not mended by replacing elements"
     changes = [change for each in analysis.elements for change in each.changes]
     mended = apply(second.model, changes)
-    if not analyse(ours, without_standing_mimics(mended), tolerance).equal:
+    if not are_equal(ours, without_standing_mimics(mended), analysis.fit, tolerance):
         return None, None, "the replaced elements do not make the robots the same"
     if second.data is None:
         return mended, mended.to_urdf().encode(), None
@@ -327,6 +333,6 @@ def _mended(
     except (NotMendedError, DynxError) as error:
         return mended, None, str(error)
     again = without_standing_mimics(again.with_base(theirs.base))
-    if not analyse(ours, again, tolerance).equal:
+    if not are_equal(ours, again, analysis.fit, tolerance):
         return mended, None, "the mended text is not read as the same robot"
     return mended, source.to_bytes(), None

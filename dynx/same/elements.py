@@ -20,8 +20,8 @@ from dynx.model.mechanism import ROOT, pose_arrays
 from dynx.model.topology import resolve_mimics
 from dynx.same.decimals import decimals, fifty_digits, rounded
 from dynx.same.fit import BodyFit, Fit, angle_of, drive, fit
-from dynx.same.matching import UNCHANGED, Matching
-from dynx.same.observability import Observability
+from dynx.same.matching import UNCHANGED, BodyPair, Matching, MatchingPlan
+from dynx.same.observability import observability_of
 from dynx.same.scales import inertia_ratio
 from dynx.same.skeleton import Skeleton, float_inertia, subtract, transformed
 from dynx.spatial.inertia import RigidInertia
@@ -129,14 +129,31 @@ def apply(model: Model, changes: Iterable[FieldChange]) -> Model:
     return replace(model, joints=tuple(ordered), links=tuple(links.values()))
 
 
-def analyse(ours: Model, theirs: Model, tolerance: float) -> Analysis:
-    """Compare two models whose bases are of one kind."""
-    retyped = list(_other_types(ours, theirs))
+def analyse(ours: Skeleton, theirs: Model, tolerance: float) -> Analysis:
+    """Compare two robots whose bases are of one kind."""
+    retyped = list(_other_types(ours.model, theirs))
     return _with_fixed_joints(ours, theirs, retyped, tolerance)
 
 
+def are_equal(ours: Skeleton, theirs: Model, known: Fit, tolerance: float) -> bool:
+    """Check whether two robots are the same. `known` is a fit of the first one and of another robot with the
+    joints of the second; its pairs are tried first, with frames that follow from the root."""
+    if theirs.joint_names == known.theirs.model.joint_names:
+        pairs = tuple(
+            BodyPair(each.ours, each.theirs, rounded(each.D) if each.ours == ROOT else None)
+            for each in known.bodies
+        )
+        with fifty_digits():
+            found = fit(ours, Skeleton(theirs), MatchingPlan(0.0, pairs, known.missing, known.extra))
+            if not any(True for _ in _of_joints(found, tolerance)):
+                elements, _ = _Inertias(found, tolerance).find()
+                if not (elements or found.missing or found.extra):
+                    return True
+    return analyse(ours, theirs, tolerance).equal
+
+
 def _with_fixed_joints(
-    ours: Model, theirs: Model, known: list[DifferingElement], tolerance: float
+    ours: Skeleton, theirs: Model, known: list[DifferingElement], tolerance: float
 ) -> Analysis:
     """Compare two models with some elements replaced; find fixed joints that explain what then differs."""
     changed = apply(theirs, (change for each in known for change in each.changes))
@@ -144,9 +161,10 @@ def _with_fixed_joints(
     tried: set[str] = {each.theirs for each in known}
     while len(best.elements) > len(known):
         trials: list[tuple[Analysis, DifferingElement, Model]] = []
-        for each in islice(_fixed_joints(best, ours, tried), MAX_TRIALS):
+        for each in islice(_fixed_joints(best, ours.model, tried), MAX_TRIALS):
             placed = apply(changed, each.changes)
-            trials.append((_analysed(ours, placed, [*known, each], tolerance), each, placed))
+            base = rounded(best.fit.bodies[0].D)
+            trials.append((_analysed(ours, placed, [*known, each], tolerance, base), each, placed))
         found = min(trials, key=lambda trial: trial[0].cost, default=None)
         if found is None or found[0].cost >= best.cost:
             break
@@ -156,10 +174,16 @@ def _with_fixed_joints(
     return best
 
 
-def _analysed(ours: Model, changed: Model, known: list[DifferingElement], tolerance: float) -> Analysis:
+def _analysed(
+    ours: Skeleton,
+    changed: Model,
+    known: list[DifferingElement],
+    tolerance: float,
+    base: Floats | None = None,
+) -> Analysis:
     with fifty_digits():
-        mine, other = Skeleton(ours), Skeleton(changed)
-        found = fit(mine, other, Matching(mine, other, tolerance).find())
+        other = Skeleton(changed)
+        found = fit(ours, other, Matching(ours, other, tolerance, base).find())
         elements = [*known, *_of_joints(found, tolerance)]
         inertials, unseen = _Inertias(found, tolerance).find()
     names = [*(link.name for link in changed.links), *(joint.name for joint in changed.joints)]
@@ -188,8 +212,10 @@ def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[
     for joint in [joint for joint in model.joints if joint.name in below and joint.name not in tried]:
         # What is written as in the other description is not at fault; what has no counterpart there may be
         # if several elements, or the place of a joint, depend on it.
+        # A single element below it that is written otherwise is as good an explanation.
         if joint.name in mine:
-            suspect = mine[joint.name].origin != joint.origin
+            several = counts[joint.name] > 1 or below[joint.name].unchanged
+            suspect = several and mine[joint.name].origin != joint.origin
         else:
             suspect = below[joint.name].tag == "joint" or counts[joint.name] > 1
         if suspect:
@@ -452,12 +478,13 @@ class _Inertias:
         off = [each for each in self._fit.bodies if self._ratio(each) > self._tolerance]
         if not off:
             return [], ()
-        self._observability = Observability(self._fit.ours)
+        self._observability = observability_of(self._fit.ours)
+        self._regrouped_sums: dict[tuple[int, ...], Mapping[int, RigidInertia]] = {}
         candidates = [candidate for each in off for candidate in self._candidates(each)]
         if not self._seen(candidates):
             return [], self._unseen(candidates)
         chosen = self._smallest(candidates)
-        sizes = self._observability.observed(self._sum(chosen))
+        sizes = self._sizes(chosen)
         elements = [self._element(each, sizes) for each in chosen]
         others = [each for each in candidates if each not in chosen]
         return elements, self._unseen(others)
@@ -533,26 +560,30 @@ class _Inertias:
         inertial = skeleton.model.links[link].inertial
         return inertial is not None and bool(inertial.mass or inertial.tensor.any())
 
-    def _sum(self, candidates: Iterable[_InertiaCandidate]) -> Mapping[int, RigidInertia]:
-        total: dict[int, RigidInertia] = {}
-        for each in candidates:
-            number = each.body.ours
-            total[number] = total[number] + each.difference if number in total else each.difference
-        return total
-
     def _seen(self, candidates: Iterable[_InertiaCandidate]) -> bool:
         return any(size > self._tolerance for size in self._sizes(candidates).values())
 
     def _sizes(self, candidates: Iterable[_InertiaCandidate]) -> dict[int, float]:
         """Return how much is seen of the sum of some differences, by body."""
-        total = self._sum(candidates)
-        own = self._fit.ours.inertias
-        total = {
-            body: inertia
-            for body, inertia in total.items()
-            if inertia_ratio(float_inertia(inertia), own[body], self._whole) > self._tolerance
-        }
-        return self._observability.observed(total)
+        groups: dict[int, list[_InertiaCandidate]] = {}
+        for each in candidates:
+            groups.setdefault(each.body.ours, []).append(each)
+        return self._observability.seen([self._sum(body, group) for body, group in groups.items()])
+
+    def _sum(self, body: int, candidates: list[_InertiaCandidate]) -> Mapping[int, RigidInertia]:
+        """Return the sum of the differences of a body, moved to the bodies at which it is seen; nothing if it
+        is below the tolerance."""
+        key = body, *(each.link for each in candidates)
+        found = self._regrouped_sums.get(key)
+        if found is None:
+            total = candidates[0].difference
+            for each in candidates[1:]:
+                total = total + each.difference
+            inertia = float_inertia(total)
+            ratio = inertia_ratio(inertia, self._fit.ours.inertias[body], self._whole)
+            found = self._observability.regrouped(body, inertia) if ratio > self._tolerance else {}
+            self._regrouped_sums[key] = found
+        return found
 
     def _smallest(self, candidates: list[_InertiaCandidate]) -> list[_InertiaCandidate]:
         """Return the fewest candidates without which no difference is seen, the first in document order."""

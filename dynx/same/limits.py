@@ -7,13 +7,17 @@ from collections.abc import Iterator
 from typing import Literal
 
 from dynx.model.elements import Limits
+from dynx.model.sdf.reader import UNLIMITED
 
 LimitKind = Literal["lower limit", "upper limit", "velocity limit", "effort limit"]
 
 
 def differs(first: float, second: float, tolerance: float) -> bool:
-    """Check whether two values differ by more than `tolerance` of the larger one."""
+    """Check whether two values differ by more than `tolerance` of the larger one; from 1e16 on they limit
+    nothing, as SDF has it."""
     size = max(abs(first), abs(second))
+    if min(first, second) >= UNLIMITED or max(first, second) <= -UNLIMITED:
+        return False
     return first != second and (math.isinf(size) or abs(first - second) > tolerance * size)
 
 

@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from dynx.model.mechanism import ROOT
 from dynx.rbd.base_parameters import rotation_to_axis, split_inertia
 from dynx.same.limits import limit_differences
 from dynx.same.registration import candidates
-from dynx.same.scales import inertia_ratio
+from dynx.same.scales import extent, inertia_ratio
 from dynx.same.skeleton import Skeleton, subtract, transformed
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
@@ -49,6 +50,18 @@ MIN_TOLERANCE = 1e-11
 
 UNCHANGED = 1.001
 """Cost of replacing an element that is written as its counterpart is: another one differs, if one can."""
+
+SLACK = 1.0
+"""Number of elements by which a frame may fit worse than another one and is still tried."""
+
+WORSE_BASE = 1.5
+"""Share of the differing elements up to which another frame of the base is still tried."""
+
+MARGIN = 1e-6
+"""Share of a limit by which a difference exceeds it for certain, whatever the rounding."""
+
+SAME_FRAME = 1e-12
+"""Difference of two poses (m, or an entry of the rotation) that are the same frame."""
 
 Key = tuple[int, int, bytes]
 
@@ -87,7 +100,15 @@ class Matching:
     ours: Skeleton
     theirs: Skeleton
     tolerance: float
+    base: Floats | None = None
+    """Pose (4, 4) of the frame of a floating base in its counterpart, if known."""
     _plans: dict[Key, MatchingPlan] = field(default_factory=dict)
+    _sizes: dict[int, float] = field(default_factory=dict)
+    _equal_inertials: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _counts: dict[Key, tuple[float, bool]] = field(default_factory=dict)
+    _named: dict[tuple[int, int], tuple[list[tuple[int, int]], list[int], list[int]]] = field(
+        default_factory=dict
+    )
     _own_costs: dict[Key, float] = field(default_factory=dict)
     _unmoved: dict[tuple[int, int], bool] = field(default_factory=dict)
     _exhausted: set[tuple[int, int]] = field(default_factory=set)
@@ -110,6 +131,8 @@ class Matching:
     def _best(self) -> MatchingPlan:
         if not (self.ours.model.floating and self.theirs.model.floating):
             return self._chosen(ROOT, ROOT, np.eye(4), 0.0)
+        if self.base is not None:
+            return self._chosen(ROOT, ROOT, self.base, 0.0)
         found: list[tuple[float, int, Floats]] = []
         # A root without mass looks the same in any frame.
         unmoved = float(self.ours.inertias[ROOT].mass) > 0.0 and self._is_unmoved(ROOT, ROOT)
@@ -123,19 +146,28 @@ class Matching:
                 break
         if found[0][0] == 0.0 or found[0][1] == 0:
             found = found[:1]
+        most = SLACK + WORSE_BASE * found[0][0]
+        found = [entry for entry in found if entry[0] <= most or entry[1] == 0]
         return min((self._chosen(ROOT, ROOT, D, 0.0) for _, _, D in found), key=lambda plan: plan.rank)
 
     def _followed(self, a: int, b: int, D: Floats, limit: float) -> float:
         """Return how many elements differ if every frame follows from D, or any number from `limit` on."""
+        key = (a, b, np.round(D, 9).tobytes())
+        known = self._counts.get(key)
+        if known is not None and (known[1] or known[0] >= limit):
+            return known[0]
         cost = self._own_cost(a, b, D)
         matched = self._by_name(a, b, D)
         lost = len(self.ours.children[a]) + len(self.theirs.children[b]) - 2 * len(matched)
         cost += 2.0 * lost
+        complete = True
         for i, j in matched:
             if cost >= limit:
+                complete = False
                 break
             followed = inverse(self.ours.placements[i]) @ D @ self.theirs.placements[j]
             cost += self._followed(i, j, followed, limit - cost)
+        self._counts[key] = cost, complete and cost < limit
         return cost
 
     def _chosen(self, a: int, b: int, D: Floats, extra: float) -> MatchingPlan:
@@ -156,15 +188,11 @@ class Matching:
         if unmoved:
             plan = self._chosen(a, b, np.eye(4), _cost(self._has_equal_origins(a, b)))
             return plan if plan.rank < best.rank else best
-        own = self._own_cost(a, b, followed)
         replaced = _cost(self._has_equal_origins(a, b))
-        for D in chain([np.eye(4)], self._aligned(a, b, followed), self._candidates_of(a, b)):
+        for D, cost in self._ordered_frames(a, b, followed, best.rank[0] - replaced):
             if len(self._plans) > MAX_PLANS:
                 break
-            # A frame in which the body itself fits worse than before is not that of the body.
-            cost = self._own_cost(a, b, D)
-            least = round(replaced + cost, 6), 0
-            if cost > own or least >= best.rank or np.allclose(D, followed, rtol=0.0, atol=1e-12):
+            if (round(replaced + cost, 6), 0) >= best.rank:
                 continue
             plan = self._chosen(a, b, D, replaced)
             if plan.rank < best.rank:
@@ -172,6 +200,35 @@ class Matching:
             if best.rank <= (1.0, 0):
                 break
         return best
+
+    def _ordered_frames(
+        self, a: int, b: int, followed: Floats, limit: float
+    ) -> Iterator[tuple[Floats, float]]:
+        """Yield the frames that body b may have in body a, but `followed`, with the number of elements that
+        differ of the bodies themselves, which is at most `limit`.
+
+        Those are first below which the fewest elements differ if all frames follow, and those are left out
+        with `SLACK` more than the first: a misplaced joint below a right frame is one element, and below a
+        wrong one nothing fits.
+        """
+        own = self._own_cost(a, b, followed)
+        found: list[tuple[float, int, Floats, float]] = []
+        fewest = np.inf
+        for D in chain([np.eye(4)], self._aligned(a, b, followed), self._candidates_of(a, b)):
+            # A frame in which the body itself fits worse than before is not that of the body.
+            cost = self._own_cost(a, b, D)
+            if cost > own or cost >= limit or float(np.max(np.abs(D - followed))) <= SAME_FRAME:
+                continue
+            count = self._followed(a, b, D, fewest + SLACK)
+            if count == 0.0:
+                yield D, cost
+                return
+            if count <= fewest + SLACK:
+                found.append((count, len(found), D, cost))
+                fewest = min(fewest, count)
+        for count, _, D, cost in sorted(found, key=_first_two):
+            if count <= fewest + SLACK:
+                yield D, cost
 
     def _aligned(self, a: int, b: int, D: Floats) -> Iterator[Floats]:
         """Yield the frames nearest to D in which the axes and the centres of mass of two bodies coincide, as
@@ -241,6 +298,13 @@ class Matching:
 
     def _by_name(self, a: int, b: int, D: Floats) -> list[tuple[int, int]]:
         """Match joints of the same name, then those whose links have the same name, then by place."""
+        known = self._named.get((a, b))
+        if known is None:
+            known = self._named[a, b] = self._matched_names(a, b)
+        matched, left, right = known
+        return sorted(matched + self._nearest(left, right, D)) if left and right else matched
+
+    def _matched_names(self, a: int, b: int) -> tuple[list[tuple[int, int]], list[int], list[int]]:
         matched: list[tuple[int, int]] = []
         left, right = list(self.ours.children[a]), list(self.theirs.children[b])
         for attribute in ("name", "child"):
@@ -251,7 +315,7 @@ class Matching:
                     matched.append((i, j))
                     left.remove(i)
                     right.remove(j)
-        return sorted(matched + self._nearest(left, right, D))
+        return sorted(matched), left, right
 
     def _by_place(self, a: int, b: int, D: Floats) -> list[tuple[int, int]]:
         return sorted(self._nearest(self.ours.children[a], self.theirs.children[b], D))
@@ -353,15 +417,20 @@ class Matching:
 
     def _has_equal_inertials(self, a: int, b: int) -> bool:
         """Check whether the links of two bodies are written with the same inertials."""
-        mine, other = (
-            {each.model.links[k].name: each.model.links[k].inertial for k in each.links[body]}
-            for each, body in ((self.ours, a), (self.theirs, b))
-        )
-        return mine == other
+        known = self._equal_inertials.get((a, b))
+        if known is None:
+            mine, other = (
+                {each.model.links[k].name: each.model.links[k].inertial for k in each.links[body]}
+                for each, body in ((self.ours, a), (self.theirs, b))
+            )
+            known = self._equal_inertials[a, b] = mine == other
+        return known
 
     def _has_same_inertia(self, a: int, b: int, D: Floats) -> bool:
         """Check whether two bodies have the same inertia but for what may belong to their parents."""
         mine = self.ours.inertias[a]
+        if self._has_other_center(a, b, D):
+            return False
         difference = subtract(mine, transformed(self.theirs.inertias[b], D))
         if inertia_ratio(difference, mine, self.ours.whole) <= self.tolerance:
             return True
@@ -374,9 +443,30 @@ class Matching:
         back: RigidInertia = remaining.transform(Q, np.zeros(3))
         return inertia_ratio(back, mine, self.ours.whole) <= self.tolerance
 
+    def _has_other_center(self, a: int, b: int, D: Floats) -> bool:
+        """Check whether mass or first moment differ already, which takes a tenth of the time of all."""
+        mine, other = self.ours.inertias[a], self.theirs.inertias[b]
+        mass = float(mine.mass)
+        if mass == 0.0:
+            return False
+        size = self._sizes.get(a)
+        if size is None:
+            size = self._sizes[a] = extent(mine, self.ours.whole)
+        limit = self.tolerance * abs(mass) * size
+        offset = mine.first_moment - D[:3, :3] @ other.first_moment - other.mass * D[:3, 3]
+        if a != ROOT and self.ours.bodies[a].revolute and not self._has_equal_inertials(a, b):
+            # The mass, and what it has along the axis, may belong to the parent.
+            axis = self.ours.axes[a]
+            return bool(np.linalg.norm(offset - axis * (axis @ offset)) > (1.0 + MARGIN) * limit)
+        excess = mass - float(other.mass)
+        if abs(excess) > (1.0 + MARGIN) * self.tolerance * abs(mass):
+            return True
+        offset = offset - excess * (mine.first_moment / mass)
+        return bool(np.linalg.norm(offset) > (1.0 + MARGIN) * limit)
 
-def _first_two(entry: tuple[float, int, Floats]) -> tuple[float, int]:
-    return entry[:2]
+
+def _first_two(entry: tuple[Any, ...]) -> tuple[float, int]:
+    return entry[0], entry[1]
 
 
 def _is_identity(T: Floats) -> bool:

@@ -9,13 +9,14 @@ vanishes there vanishes everywhere, with probability 1.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from dynx.model.mechanism import ROOT, BodyFrame, Mechanism
-from dynx.rbd.base_parameters import align_frames, regroup_inertias
+from dynx.rbd.base_parameters import align_frames, split_inertia
 from dynx.rbd.regressor import inertial_regressor_at, parameters_from_inertia
 from dynx.same.decimals import rounded
 from dynx.same.scales import inertia_ratio
@@ -33,6 +34,12 @@ Differences = Mapping[int, RigidInertia]
 """Difference of the inertia of some bodies, by the number of the body."""
 
 
+@lru_cache(maxsize=1)
+def observability_of(skeleton: Skeleton) -> Observability:
+    """Return the observability of a robot's inertias; the last one is kept, with what it has evaluated."""
+    return Observability(skeleton)
+
+
 class Observability:
     """Which differences of inertias of one robot are seen in some state."""
 
@@ -42,14 +49,32 @@ class Observability:
         self._mechanism = _rounded(skeleton.mechanism)
         self._aligned = align_frames(self._mechanism)
         inertias = [self._aligned.root, *(body.inertia for body in self._aligned.bodies)]
+        self._frames = {frame.body: (frame.R, frame.p) for frame in self._aligned.frames}
         self._own = {number: float_inertia(inertia) for number, inertia in enumerate(inertias, ROOT)}
 
-    def observed(self, differences: Differences) -> dict[int, float]:
-        """Return, for each body in whose parameters a difference is seen, its size relative to the natural
-        magnitude of the body (`inertia_ratio`), after parameters were moved to where they are seen."""
+    def regrouped(self, body: int, difference: RigidInertia) -> Differences:
+        """Move the parameters of a difference of one body to the bodies at which they are seen: those that
+        may belong to the parent of a joint are the parent's."""
+        aligned, frames = self._aligned, self._frames
+        found: dict[int, RigidInertia] = {}
+        moved: RigidInertia = difference.transform(*frames[body])
+        while body != ROOT:
+            joint = aligned.bodies[body]
+            found[body], redundant = split_inertia(moved, joint.revolute)
+            moved, body = redundant.transform(joint.R, joint.p), joint.parent
+        found[ROOT] = moved
+        return found
+
+    def seen(self, regrouped: Iterable[Differences]) -> dict[int, float]:
+        """Return, for each body in whose parameters the sum of some regrouped differences is seen, its size
+        relative to the natural magnitude of the body (`inertia_ratio`)."""
+        total: dict[int, RigidInertia] = {}
+        for each in regrouped:
+            for body, inertia in each.items():
+                total[body] = total[body] + inertia if body in total else inertia
         remaining = {
             body: (inertia, inertia_ratio(inertia, self._own[body], self._skeleton.whole))
-            for body, inertia in self._regrouped(differences).items()
+            for body, inertia in total.items()
         }
         if not self._skeleton.model.floating:
             remaining.pop(ROOT, None)
@@ -58,28 +83,13 @@ class Observability:
             return ratios
         return self._projected({body: remaining[body][0] for body in ratios}, ratios)
 
-    def _regrouped(self, differences: Differences) -> dict[int, RigidInertia]:
-        mechanism = self._mechanism
-        zero = RigidInertia(*(0 * x for x in _parts(mechanism.root)))
-        changed: Mechanism = replace(
-            mechanism,
-            root=float_inertia(differences.get(ROOT, zero)),
-            bodies=tuple(
-                replace(body, inertia=float_inertia(differences.get(k, zero)))
-                for k, body in enumerate(mechanism.bodies)
-            ),
-            frames=(),
-        )
-        regrouped = regroup_inertias(align_frames(changed))
-        inertias = [regrouped.root, *(body.inertia for body in regrouped.bodies)]
-        return {body: float_inertia(inertia) for body, inertia in enumerate(inertias, ROOT)}
-
     def _projected(self, inertias: Differences, ratios: dict[int, float]) -> dict[int, float]:
         """Remove the part in the null space of the regressor, which is taken at the bodies that differ."""
         bodies = list(inertias)
         parameters = np.concatenate([parameters_from_inertia(inertias[body]) for body in bodies])
         scales = np.concatenate([self._scales(body) for body in bodies])
-        columns = self._regressor(bodies) * scales
+        numbers = np.concatenate([np.arange(10) + 10 * (body + 1) for body in bodies])
+        columns = self._regressor[:, numbers] * scales
         lengths = np.linalg.norm(columns, axis=0)
         seen = lengths > NULL * float(np.max(lengths, initial=0.0))
         if not seen.any():
@@ -106,8 +116,10 @@ class Observability:
         moment = float(np.max(np.abs(own.rotational_inertia))) or mass * length**2
         return np.array([mass] + [np.sqrt(mass * moment)] * 3 + [moment] * 6)
 
-    def _regressor(self, bodies: list[int]) -> Floats:
-        """Return the rows (states * nv, 10 n) of the regressor of some aligned bodies."""
+    @cached_property
+    def _regressor(self) -> Floats:
+        """The regressor of all aligned bodies, the root first, at all states: (m, 10 n), where an orthogonal
+        transform has left at most as many rows as columns."""
         aligned = self._aligned
         frames = [frame.name for frame in aligned.frames]
         model, rng = self._skeleton.model, np.random.default_rng(SEED)
@@ -119,9 +131,10 @@ class Observability:
         v, a = (rng.standard_normal((STATES, S.shape[1])) @ S.T for _ in range(2))
         # A frame has the pose that it had before the bodies got other frames: those of the bodies are taken.
         aligned = replace(aligned, frames=_body_frames(aligned))
+        bodies = range(ROOT, len(aligned.bodies))
         numbers = [frames.index(str(body)) for body in bodies]
         Y = inertial_regressor_at(aligned, q, v, a, numbers)
-        return np.asarray((S.T @ Y).reshape(-1, 10 * len(bodies)))
+        return np.asarray(np.linalg.qr((S.T @ Y).reshape(-1, 10 * len(bodies)), mode="r"))
 
 
 def _coupled_q(mechanism: Mechanism, q: Floats) -> Floats:
@@ -131,10 +144,6 @@ def _coupled_q(mechanism: Mechanism, q: Floats) -> Floats:
         return q
     base = 7 if coupling.floating else 0
     return coupling.expand_q(q[:, : base + coupling.n_joints])
-
-
-def _parts(inertia: RigidInertia) -> tuple[Floats, Floats, Floats]:
-    return inertia.mass, inertia.first_moment, inertia.rotational_inertia
 
 
 def _rounded(mechanism: Mechanism) -> Mechanism:

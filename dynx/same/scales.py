@@ -43,12 +43,9 @@ def inertia_ratio(difference: RigidInertia, inertia: RigidInertia, whole: Whole)
             _ratio(float(np.max(np.abs(dh))), whole.mass * length),
             _ratio(float(np.max(np.abs(dI))), moment or whole.mass * length**2),
         )
-    h = np.asarray(inertia.first_moment, dtype=float)
-    c = h / mass
-    H, C = skew(h), skew(c)
-    central = float(np.max(np.abs(tensor + H @ H / mass)))
-    mass = abs(mass)
-    size = max(float(np.linalg.norm(c)), float(np.sqrt(central / mass))) or whole.length
+    c = np.asarray(inertia.first_moment, dtype=float) / mass
+    C, central = skew(c), _central_moment(inertia)
+    mass, size = abs(mass), extent(inertia, whole)
     # About the centre of mass: r = r' + c.
     dh_central = dh - dm * c
     D = skew(dh)
@@ -59,6 +56,20 @@ def inertia_ratio(difference: RigidInertia, inertia: RigidInertia, whole: Whole)
         float(np.linalg.norm(dh_central)) / (mass * size),
         float(np.max(np.abs(dI_central))) / moment,
     )
+
+
+def extent(inertia: RigidInertia, whole: Whole) -> float:
+    """Return the larger of the distance [m] of a body's centre of mass from the origin and its radius of
+    gyration; the reach of the robot where both are 0. The body has mass."""
+    mass = float(inertia.mass)
+    distance = float(np.linalg.norm(np.asarray(inertia.first_moment, dtype=float) / mass))
+    return max(distance, float(np.sqrt(_central_moment(inertia) / abs(mass)))) or whole.length
+
+
+def _central_moment(inertia: RigidInertia) -> float:
+    H = skew(np.asarray(inertia.first_moment, dtype=float))
+    tensor = np.asarray(inertia.rotational_inertia, dtype=float)
+    return float(np.max(np.abs(tensor + H @ H / float(inertia.mass))))
 
 
 def _ratio(part: float, size: float) -> float:

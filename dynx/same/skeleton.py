@@ -11,7 +11,7 @@ from dynx.model import Model
 from dynx.model.elements import IDENTITY, Joint
 from dynx.model.mechanism import ROOT, Body, Mechanism, build_mechanism
 from dynx.model.topology import lock_joint
-from dynx.same.decimals import decimals, rounded
+from dynx.same.decimals import decimals, fifty_digits, rounded
 from dynx.same.scales import Whole
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
@@ -28,6 +28,12 @@ def without_standing_mimics(model: Model) -> Model:
         for joint in model.joints
     )
     return replace(model, joints=joints, base_pose=IDENTITY)
+
+
+def exact_skeleton(model: Model) -> Skeleton:
+    """Build the skeleton of a model in 50 digits."""
+    with fifty_digits():
+        return Skeleton(model)
 
 
 def float_inertia(inertia: RigidInertia) -> RigidInertia:

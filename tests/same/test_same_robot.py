@@ -301,6 +301,59 @@ def test_shapes_and_frames_stand_apart() -> None:
     assert [each.theirs for each in report.attributes if each.kind == "frame"] == ["tool0"]
 
 
+def test_the_frame_of_a_link_with_mass_is_a_freedom_and_of_a_place_a_difference() -> None:
+    model = dynx.load("six_axis_arm")
+    holder = model.links[-1].name
+    T = Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))
+    held = Inertial(2.0, Pose((0.01, 0.02, 0.03)), 0.1, 0.0, 0.0, 0.2, 0.0, 0.25)
+    links = (*model.links, Link("held", held), Link("place", None))
+
+    def of(origin: Pose, center: Pose, place: Pose) -> Model:
+        joints = (
+            *model.joints,
+            Joint("holds", "fixed", holder, "held", origin),
+            Joint("places", "fixed", holder, "place", place),
+        )
+        changed = [
+            replace(each, inertial=replace(held, origin=center)) for each in links if each.name == "held"
+        ]
+        return Model.build("robot", [*links[:-2], *changed, links[-1]], joints)
+
+    first = of(T, held.origin, T)
+    turned = of(Pose(), Pose.from_matrix(T.matrix @ held.origin.matrix), T)
+    report = same_robot(first, turned)
+    assert report.same
+    assert report.attributes == ()
+    assert [each.theirs for each in report.freedoms if each.kind == "frame"] == ["held"]
+    # The frame of a place is one, also where the body it is on is described in another frame.
+    report = same_robot(first, with_moved_frames(of(T, held.origin, Pose()), np.random.default_rng(3)))
+    assert report.same
+    assert "place" in [each.theirs for each in report.attributes if each.kind == "frame"]
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 0.1])
+def test_sizes_and_places_of_shapes_are_compared_to_the_tolerance(size: float) -> None:
+    text = """<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/>
+        <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+        <collision><origin xyz="0.25 0 0"/><geometry><box size="0.3 0.2 0.1"/></geometry></collision></link>
+        <joint name="j" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 0.5"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    for old, new in (("0.3 0.2", f"{0.3 * (1.0 + size)!r} 0.2"), ("0.25 0 0", f"{0.25 + size!r} 0 0")):
+        report = same_robot(text, text.replace(old, new), tolerance=size / 10.0)
+        assert report.same
+        assert [each.kind for each in report.attributes] == ["collision shapes"]
+        assert report.attributes[0].first != report.attributes[0].second
+        assert same_robot(text, text.replace(old, new), tolerance=min(size * 10.0, 0.9)).attributes == ()
+
+
+def test_limits_that_limit_nothing_are_the_same() -> None:
+    text = """<robot name="r"><link name="a"/><link name="b"/>
+        <joint name="j" type="revolute"><parent link="a"/><child link="b"/>
+        <limit lower="-1e16" upper="1e16" effort="1" velocity="1"/></joint></robot>"""
+    assert same_robot(text, text.replace('"revolute"', '"continuous"')).attributes == ()
+    assert len(same_robot(text, text.replace('upper="1e16"', 'upper="1e15"')).attributes) == 1
+
+
 def test_the_base_of_a_urdf_file_is_that_of_the_other_description() -> None:
     model = dynx.load("solo12", base="floating")
     report = same_robot("solo12", model)
