@@ -21,6 +21,8 @@ from dynx.same.decimals import rounded
 from dynx.same.elements import pose_text, vector_text
 from dynx.same.fit import BodyFit, Fit, angle_of
 from dynx.same.limits import differs, limit_differences
+from dynx.same.scales import inertia_ratio
+from dynx.same.skeleton import float_inertia, subtract, transformed
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 
@@ -116,8 +118,34 @@ def _of_links(ours: Model, theirs: Model, found: Fit, each: BodyFit, tolerance: 
         if first != second and first not in other and second not in mine:
             lines = ours.link(first).line, theirs.link(second).line
             yield Attribute("name", "link", first, second, first, second, *lines)
+            mine.pop(first)
+            other.pop(second)
+    for a, b in _renamed_links(mine, other, found, each, tolerance):
+        lines = ours.link(a).line, theirs.link(b).line
+        yield Attribute("name", "link", a, b, a, b, *lines)
     for kind in ("collision shapes", "visual shapes"):
         yield from _of_shapes(kind, ours, theirs, found, each, tolerance)
+
+
+def _renamed_links(
+    mine: dict[str, int], other: dict[str, int], found: Fit, each: BodyFit, tolerance: float
+) -> Iterator[tuple[str, str]]:
+    """Yield links with mass that only the names distinguish: those of a body whose inertias are equal."""
+    left = [name for name in other if name not in mine]
+    for a in mine:
+        if a in other or not left:
+            continue
+        inertia = found.ours.link_inertia(mine[a])
+        for b in left:
+            difference = subtract(inertia, transformed(found.theirs.link_inertia(other[b]), each.D))
+            own = float_inertia(inertia)
+            if (
+                own.mass > 0.0
+                and inertia_ratio(float_inertia(difference), own, found.ours.whole) <= tolerance
+            ):
+                yield a, b
+                left.remove(b)
+                break
 
 
 def _of_shapes(
@@ -157,7 +185,7 @@ def _of_shapes(
 
 
 @dataclass(frozen=True)
-class _PlacedShape:
+class _ShapeOfBody:
     """A shape with its pose T (4, 4) in the frame of our body: what is equal or not, and what is as large."""
 
     kind: tuple[object, ...]
@@ -165,7 +193,7 @@ class _PlacedShape:
     T: Floats
     words: str
 
-    def equals(self, other: _PlacedShape, tolerance: float, length: float) -> bool:
+    def equals(self, other: _ShapeOfBody, tolerance: float, length: float) -> bool:
         """Check whether two shapes differ by at most `tolerance` of their sizes, of `length` and of 1 rad."""
         if self.kind != other.kind or self.sizes.shape != other.sizes.shape:
             return False
@@ -177,7 +205,7 @@ class _PlacedShape:
 
 def _shapes(
     kind: str, model: Model, links: list[int], found: Fit, each: BodyFit | None
-) -> list[_PlacedShape]:
+) -> list[_ShapeOfBody]:
     """Return the shapes of some links with their poses in the frame of our body."""
     shapes = []
     skeleton = found.ours if each is None else found.theirs
@@ -191,24 +219,24 @@ def _shapes(
             )
         except DescriptionError as error:
             words = f"a fault ({error.message})"
-            shapes.append(_PlacedShape((words,), np.zeros(0), np.eye(4), words))
+            shapes.append(_ShapeOfBody((words,), np.zeros(0), np.eye(4), words))
             continue
         if not placed:
             continue
         T = rounded(skeleton.link_pose(number))
         if each is not None:
             T = rounded(each.D) @ T
-        shapes += [_placed_shape(shape, T @ shape.origin.matrix) for shape in placed]
+        shapes += [_shape_of_body(shape, T @ shape.origin.matrix) for shape in placed]
     return shapes
 
 
-def _placed_shape(placed: Visual | Collision, T: Floats) -> _PlacedShape:
+def _shape_of_body(placed: Visual | Collision, T: Floats) -> _ShapeOfBody:
     """Take a shape apart; a mesh is its file's name and its scale."""
     shape = placed.shape
     if isinstance(shape, Mesh):
         scale = "" if shape.scale == (1.0, 1.0, 1.0) else f" scaled by {vector_text(shape.scale, DIGITS)}"
         name = PurePath(shape.name).name
-        return _PlacedShape(("mesh", name), np.array(shape.scale), T, f"mesh {name}{scale}")
+        return _ShapeOfBody(("mesh", name), np.array(shape.scale), T, f"mesh {name}{scale}")
     kind: list[object] = [type(shape).__name__.lower()]
     sizes: list[float] = []
     words = []
@@ -220,7 +248,7 @@ def _placed_shape(placed: Visual | Collision, T: Floats) -> _PlacedShape:
         sizes += [float(number) for number in numbers]
         words.append(f"{name} {vector_text(map(float, numbers), DIGITS)}")
     text = " ".join([str(kind[0]), ", ".join(words)]).strip()
-    return _PlacedShape(tuple(kind), np.array(sizes), T, text)
+    return _ShapeOfBody(tuple(kind), np.array(sizes), T, text)
 
 
 def frame_differences(

@@ -68,7 +68,7 @@ class Coordinate:
 
 
 @dataclass(frozen=True)
-class _Comparison:
+class _ReportFields:
     """Fields that a report and its document share."""
 
     first: str
@@ -89,7 +89,7 @@ class _Comparison:
 
 
 @dataclass(frozen=True)
-class SameReport(_Comparison):
+class SameReport(_ReportFields):
     """Whether two descriptions are those of one robot, and what differs.
 
     `first` and `second` are the names that the caller gave, the sources where they were read from.
@@ -152,7 +152,7 @@ class SameReport(_Comparison):
 
 
 @dataclass(frozen=True)
-class SameDocument(_Comparison):
+class SameDocument(_ReportFields):
     """The JSON document of ``dynx same``."""
 
     verdict: str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 import dynx
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, Link, Mimic, Pose
+from dynx.model.library import find
 from dynx.same import SameReport, same_robot
 from dynx.testing import assert_same_robot
 from dynx.testing.strategies import models
@@ -329,6 +331,15 @@ def test_the_frame_of_a_link_with_mass_is_a_freedom_and_of_a_place_a_difference(
     report = same_robot(first, with_moved_frames(of(T, held.origin, Pose()), np.random.default_rng(3)))
     assert report.same
     assert "place" in [each.theirs for each in report.attributes if each.kind == "frame"]
+
+
+def test_another_name_of_a_link_that_a_fixed_joint_holds_is_listed() -> None:
+    text = Path(find("allegro_left_hand")).read_text(encoding="utf-8")
+    report = same_robot(text, text.replace('"link_15.0_tip"', '"thumb"'))
+    assert report.same
+    assert [(each.kind, each.ours, each.theirs) for each in report.attributes] == [
+        ("name", "link_15.0_tip", "thumb")
+    ]
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-6, 0.1])
