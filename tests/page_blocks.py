@@ -2,8 +2,8 @@
 
     python -m tests.page_blocks [--jobs N] [--small] [PAGE ...]
 
-runs all blocks, or those of the pages whose paths in docs begin with PAGE (ik.md, how-to), and says of
-each that is wrong why. Of the process of a block these hold:
+runs all blocks, those of the pages whose paths in docs begin with PAGE (ik.md, how-to), or the one at a line
+(ik.md:57), and says of each that is wrong why. Of the process of a block these hold:
 
 - It finds the packages that ``pip install .`` brings, and those of the extras that the page names
   (``.[viewer,film]``, "the extras `mujoco` and `drake`"), and no others.
@@ -386,8 +386,16 @@ def main() -> int:
     parser.add_argument("--only", choices=RUN, default=RUN, nargs="*", metavar="LANGUAGE", help="%(choices)s")
     parser.add_argument("--small", action="store_true", help="take the values of # small: VALUE")
     given = parser.parse_args()
-    names = [page for page in PAGES if not given.pages or page.startswith(tuple(given.pages))]
-    blocks = [block for page in names for block in blocks_of(page) if block.language in given.only]
+    all_blocks = [block for page in PAGES for block in blocks_of(page)]
+    for name in given.pages:
+        if not any(str(block).startswith(name) for block in all_blocks):
+            parser.error(f"no page has a path that begins with {name!r}, and no block is at this line")
+    blocks = [
+        block
+        for block in all_blocks
+        if block.language in given.only
+        and (not given.pages or block.page.startswith(tuple(given.pages)) or str(block) in given.pages)
+    ]
     if "DYNX_CACHE_DIR" not in os.environ:
         cache_folder = tempfile.TemporaryDirectory(prefix="dynx-blocks-")
         os.environ["DYNX_CACHE_DIR"] = cache_folder.name
