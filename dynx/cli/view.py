@@ -15,7 +15,7 @@ from dynx.cli.shell.inputs import Numbers, configuration
 from dynx.cli.shell.output import check_writable, console, progress_bar, simulated_time_bar
 from dynx.errors import ArgumentError, DynxError, RobotNotFoundError, nearest, shown
 from dynx.files.films import WRITERS
-from dynx.files.reading import irregularity
+from dynx.files.reading import irregularity, read_file
 from dynx.model import Model
 from dynx.model.elements import Joint
 from dynx.model.geometry import Geometry
@@ -113,6 +113,7 @@ def _export(viewer: Viewer, path: str) -> None:
 
 
 _SCENES = (".toml", ".json")
+_MJCF = (".xml", ".mjcf")
 _ROLLOUTS = (".npz", ".mcap")
 _TABLE = ".csv"
 
@@ -156,7 +157,21 @@ def _kind_of(target: str) -> str:
         )
     if suffix in _ROLLOUTS:
         return "rollout"
-    return "scene" if suffix in _SCENES or target in scene_names() else "robot"
+    if suffix in _SCENES or target in scene_names() or (suffix in _MJCF and _holds_several(target)):
+        return "scene"
+    return "robot"
+
+
+def _holds_several(path: str) -> bool:
+    """Check whether a file in MJCF has several trees that move; another is read, or refused, as a robot."""
+    from dynx.model.mjcf.reader import read_trees
+
+    try:
+        found = read_trees(read_file(path), path)
+    except DynxError:
+        return False
+    trees = () if found is None else found.trees
+    return sum(tree.free or any(body.jointed for body in tree.bodies) for tree in trees) > 1
 
 
 def load_robot(target: str, base: Base | None) -> Model:

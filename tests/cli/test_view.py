@@ -132,6 +132,23 @@ def test_a_scene_is_recorded_in_one_engine(tmp_path: Path) -> None:
     assert page.is_file()
 
 
+BALL = '<body name="{0}" pos="{1} 0 1"><freejoint/><geom size="0.1" mass="1"/></body>'
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_mjcf_of_several_bodies_is_a_scene(tmp_path: Path, count: int) -> None:
+    pytest.importorskip("pybullet")
+    source, page = tmp_path / "balls.xml", tmp_path / "page.html"
+    balls = "".join(BALL.format(name, at) for at, name in enumerate("ab"[:count]))
+    source.write_text(f"<mujoco><worldbody>{balls}</worldbody></mujoco>")
+    code, output = run(str(source), "--duration", "0.1", "--engine", "pybullet", "--export", str(page))
+    if count == 1:
+        assert "--duration has no effect on a robot" in output
+        code, output = run(str(source), "--export", str(page))
+    assert code == 0, output
+    assert page.is_file()
+
+
 DIVERGING = """
 schema = "dynx.scene/1"
 name = "overlapping"

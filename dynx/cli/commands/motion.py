@@ -310,10 +310,10 @@ def view() -> None:
     """Show a robot, a rollout or a scene in the browser.
 
     TARGET is a robot (a URDF, xacro, MJCF or SDF file, or a name), a rollout (.npz or .mcap of `dynx sim
-    --save`), or a scene (TOML or JSON, or the name of a scene of dynx). A robot has sliders and a handle
-    that moves a frame by inverse kinematics; a rollout has a timeline; a scene is stepped live, or
-    recorded first for --compare and --export. A .xacro file, of a scene too, is expanded, which evaluates
-    expressions of it as Python code: show only such files that you trust.
+    --save`), or a scene (TOML or JSON, MJCF of several robots or bodies, or the name of a scene of dynx). A
+    robot has sliders and a handle that moves a frame by inverse kinematics; a rollout has a timeline; a scene
+    is stepped live, or recorded first for --compare and --export. A .xacro file, of a scene too, is expanded,
+    which evaluates expressions of it as Python code: show only such files that you trust.
 
     The page is served until Ctrl-C. Exit code 0; 2 for input that cannot be shown, or a port that is taken.
 
