@@ -86,6 +86,9 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
 WITH_CONTENT_OF_THEIR_OWN = frozenset(["composite", "flexcomp"])
 """Elements whose content has attributes of its own, under tags that stand elsewhere too."""
 
+MAX_ELEMENTS = 10 * MAX_LINKS
+"""Largest number of elements of a model with its included files, and of copies that ``<replicate>`` makes."""
+
 _SHORTEST = 1e-14
 """Length of a direction below which MuJoCo refuses it."""
 
@@ -96,6 +99,14 @@ class MjcfReading(FilesReading):
 
     origins: dict[int, tuple[Element, Origin]] = field(default_factory=dict)
     """Element of an attached model, and its origin, by the identity of the element."""
+    copied: int = 0
+    """Number of copies of elements that ``<attach>`` and ``<replicate>`` made, in all models together."""
+
+    def count_copy(self, element: Element, what: str) -> None:
+        """Count a copy of an element; raise DescriptionError for too many."""
+        self.copied += 1
+        if self.copied > MAX_ELEMENTS:
+            raise self.error(element, f"{what} makes more than {MAX_ELEMENTS} elements")
 
     def like(self, element: Element, attributes: dict[str, str]) -> Element:
         """Return an element at the place of another one, with other attributes and the same content."""
@@ -115,10 +126,6 @@ class MjcfReading(FilesReading):
     def flag(self, element: Element, attribute: str, what: str, default: bool) -> bool:
         """Return an attribute that is ``true`` or ``false``."""
         return self.choice(element, attribute, what, ("false", "true"), str(default).lower()) == "true"
-
-
-MAX_ELEMENTS = 10 * MAX_LINKS
-"""Largest number of elements of a model with its included files, and of copies that ``<replicate>`` makes."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ other sections come along where all that they refer to is attached. Options stay
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +17,6 @@ from dynx.model.elements import Note
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh, reason_unknown
 from dynx.model.mjcf.document import (
     ATTRIBUTES,
-    MAX_ELEMENTS,
     WITH_CONTENT_OF_THEIR_OWN,
     WITH_DEFAULTS,
     Includes,
@@ -127,9 +126,11 @@ class _NamesByKind:
     def hold(self, element: Element, least: int = 0) -> bool:
         """Check whether all that an element refers to is among them, and that it refers to so much."""
         references = [*_references(element)]
-        everything = set().union(*self._names.values())
         return len(references) >= least and all(
-            name in (everything if kind == "any" else self._names.get(kind, ())) for kind, name in references
+            any(name in names for names in self._names.values())
+            if kind == "any"
+            else name in self._names.get(kind, ())
+            for kind, name in references
         )
 
 
@@ -152,11 +153,10 @@ class _Copier:
     origin: Origin
     external: bool
     """True for elements of another model, whose assets and classes come along under names of their own."""
-    budget: Callable[[Element], None]
 
     def copy(self, element: Element, depth: int = 0) -> Element:
         """Return a copy of an element and of those in it."""
-        self.budget(element)
+        self.reading.count_copy(element, "<attach>")
         if depth > MAX_DEPTH:
             raise self.reading.error(element, f"attached models are more than {MAX_DEPTH} elements deep")
         attributes = {
@@ -206,7 +206,6 @@ class _Attacher:
         self._children: dict[str, _Child] = {}
         self._seen: dict[tuple[str, str], _Seen] = {}
         self._before: list[Element] = []
-        self._count = 0
         self.sections: list[Element] = []
         """Sections of the elements that came along."""
 
@@ -293,9 +292,7 @@ class _Attacher:
                     element, f"model {shown(name)} has no {named[0]} {shown(given[named[0]])} to attach"
                 )
             parts, around = [found[0]], found[1] or around
-        copier = _Copier(
-            reading, prefix, Origin(document.compiler, child.source), external=True, budget=self._spend
-        )
+        copier = _Copier(reading, prefix, Origin(document.compiler, child.source), external=True)
         self._bring(element, name, child, copier)
         self._refer(parts, document.root.children, copier)
         return self._frame(element, [copier.copy(part) for part in parts], f"{prefix}{around}")
@@ -320,7 +317,7 @@ class _Attacher:
                 element, f"no {kind} {shown(name)} stands before <attach>{nearest(name, known)}"
             )
         origin = Origin(self._document.compiler, self._around[-1])
-        copier = _Copier(reading, prefix, origin, external=False, budget=self._spend)
+        copier = _Copier(reading, prefix, origin, external=False)
         self._refer([seen.element], self._before, copier)
         return self._frame(element, [copier.copy(seen.element)], seen.childclass or self._document.main_class)
 
@@ -339,11 +336,6 @@ class _Attacher:
                     (child.tag, child.attributes["name"]), _Seen(child, inner, finished=True)
                 )
             self._see(child, inner)
-
-    def _spend(self, element: Element) -> None:
-        self._count += 1
-        if self._count > MAX_ELEMENTS:
-            raise self._reading.error(element, f"<attach> makes more than {MAX_ELEMENTS} elements")
 
     def _bring(self, element: Element, name: str, child: _Child, copier: _Copier) -> None:
         """Copy the classes, the assets and the statements of dynx of a model, once for each prefix."""
@@ -433,6 +425,7 @@ def _has(element: Element, tag: str) -> bool:
 
 def _suffixed(element: Element, suffix: str, reading: MjcfReading) -> Element:
     """Return a copy of an element of a section whose name and references have a suffix."""
+    reading.count_copy(element, "<replicate>")
     attributes = {
         name: f"{value}{suffix}" if name == "name" or name in _KIND_OF else value
         for name, value in element.attributes.items()
@@ -448,7 +441,6 @@ class _Replicates:
     def __init__(self, document: MjcfText, attached: Sequence[Element]) -> None:
         """`attached` are the sections that attached models brought."""
         self._document, self._reading, self._attached = document, document.reading, attached
-        self._count = 0
 
     def expand(self, element: Element) -> None:
         for child in element.children:
@@ -514,9 +506,7 @@ class _Replicates:
             ]
 
     def _renamed(self, element: Element, suffix: str) -> Element:
-        self._count += 1
-        if self._count > MAX_ELEMENTS:
-            raise self._reading.error(element, f"<replicate> makes more than {MAX_ELEMENTS} elements")
+        self._reading.count_copy(element, "<replicate>")
         attributes = dict(element.attributes)
         if "name" in attributes:
             attributes["name"] += suffix

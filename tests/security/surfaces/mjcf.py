@@ -75,6 +75,35 @@ def _(box: Box) -> Deed:
     return every_engine(box, mjcf(BODY + '<attach model="s" body="b" prefix="p"/>', asset))
 
 
+@attack("bomb", "models that attach one another")
+def _(box: Box) -> Deed:
+    for name, other in (("a", "b"), ("b", "a")):
+        asset = f'<asset><model name="m" file="{other}.xml"/></asset>'
+        box.file(f"{name}.xml", mjcf(f'<attach model="m" prefix="{name}"/>', asset))
+    asset = '<asset><model name="m" file="a.xml"/></asset>'
+    return info(box, mjcf('<attach model="m" prefix="p"/>', asset))
+
+
+@attack("bomb", "models of which each attaches the next one twice")
+def _(box: Box) -> Deed:
+    for k in range(40):
+        asset = "".join(f'<model name="{side}" file="m{k + 1}.xml"/>' for side in "lr")
+        both = "".join(f'<attach model="{side}" prefix="{side}"/>' for side in "lr")
+        box.file(f"m{k}.xml", mjcf(both, f"<asset>{asset}</asset>"))
+    box.file("m40.xml", mjcf())
+    asset = '<asset><model name="m" file="m0.xml"/></asset>'
+    return info(box, mjcf('<attach model="m" prefix="p"/>', asset))
+
+
+@attack("bomb", "bodies of which each attaches the one before twice")
+def _(box: Box) -> Deed:
+    text = '<body name="b0"><geom size="0.1"/></body>'
+    for k in range(1, 60):
+        both = "".join(f'<attach body="b{k - 1}" prefix="{side}{k}"/>' for side in "lr")
+        text += f'<body name="b{k}">{both}</body>'
+    return info(box, mjcf(text))
+
+
 @attack("path", "mesh outside")
 def _(box: Box) -> Deed:
     return every_engine(box, mesh(f"{box.outside}/secret.stl"), (2,))
