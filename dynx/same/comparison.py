@@ -113,6 +113,12 @@ def same_robot(
     folders: list[StrPath] = [package_dirs] if isinstance(package_dirs, str) else list(package_dirs)
     first, second = _read(a, base, folders), _read(b, base, folders)
     first, second, notes, unmatched = _with_one_base(first, second)
+    notes += [
+        f"{each.name}, {note}; it is not compared"
+        for each in (first, second)
+        for note in each.model.notes
+        if note.message.startswith("not read")
+    ]
     ours, theirs = (without_standing_mimics(each.model) for each in (first, second))
     skeleton = exact_skeleton(ours)
     analysis = analyse(skeleton, theirs, tolerance)

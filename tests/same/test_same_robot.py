@@ -357,6 +357,17 @@ def test_sizes_and_places_of_shapes_are_compared_to_the_tolerance(size: float) -
         assert same_robot(text, text.replace(old, new), tolerance=min(size * 10.0, 0.9)).attributes == ()
 
 
+def test_what_is_not_read_is_said_not_to_be_compared() -> None:
+    model = dynx.load("planar_2r")
+    text = model.to_mjcf()
+    joint = model.joint_names[0]
+    motors = f'<actuator><motor joint="{joint}"/></actuator></mujoco>'
+    report = same_robot(model, text.replace("</mujoco>", motors))
+    assert report.same
+    (note,) = [each for each in report.notes if "<actuator>" in each]
+    assert note.endswith("it is not compared")
+
+
 def test_limits_that_limit_nothing_are_the_same() -> None:
     text = """<robot name="r"><link name="a"/><link name="b"/>
         <joint name="j" type="revolute"><parent link="a"/><child link="b"/>
