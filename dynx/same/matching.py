@@ -54,9 +54,6 @@ UNCHANGED = 1.001
 SLACK = 1.0
 """Number of elements by which a frame may fit worse than another one and is still tried."""
 
-WORSE_BASE = 1.5
-"""Share of the differing elements up to which another frame of the base is still tried."""
-
 MARGIN = 1e-6
 """Share of a limit by which a difference exceeds it for certain, whatever the rounding."""
 
@@ -146,8 +143,6 @@ class Matching:
                 break
         if found[0][0] == 0.0 or found[0][1] == 0:
             found = found[:1]
-        most = SLACK + WORSE_BASE * found[0][0]
-        found = [entry for entry in found if entry[0] <= most or entry[1] == 0]
         return min((self._chosen(ROOT, ROOT, D, 0.0) for _, _, D in found), key=lambda plan: plan.rank)
 
     def _followed(self, a: int, b: int, D: Floats, limit: float) -> float:
@@ -207,9 +202,9 @@ class Matching:
         """Yield the frames that body b may have in body a, but `followed`, with the number of elements that
         differ of the bodies themselves, which is at most `limit`.
 
-        Those are first below which the fewest elements differ if all frames follow, and those are left out
-        with `SLACK` more than the first: a misplaced joint below a right frame is one element, and below a
-        wrong one nothing fits.
+        Those are first below which the fewest elements differ if all frames follow. Those with `SLACK` more
+        than the first are left out, unless the bodies themselves fit: below a right frame a misplaced joint
+        is one element, but nothing fits that follows from it.
         """
         own = self._own_cost(a, b, followed)
         found: list[tuple[float, int, Floats, float]] = []
@@ -223,11 +218,11 @@ class Matching:
             if count == 0.0:
                 yield D, cost
                 return
-            if count <= fewest + SLACK:
+            if count <= fewest + SLACK or cost == 0.0:
                 found.append((count, len(found), D, cost))
                 fewest = min(fewest, count)
         for count, _, D, cost in sorted(found, key=_first_two):
-            if count <= fewest + SLACK:
+            if count <= fewest + SLACK or cost == 0.0:
                 yield D, cost
 
     def _aligned(self, a: int, b: int, D: Floats) -> Iterator[Floats]:

@@ -357,6 +357,17 @@ def test_sizes_and_places_of_shapes_are_compared_to_the_tolerance(size: float) -
         assert same_robot(text, text.replace(old, new), tolerance=min(size * 10.0, 0.9)).attributes == ()
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_misplaced_joint_near_a_base_whose_frame_is_moved_is_one_element(seed: int) -> None:
+    # All below it fits a wrong frame of the base; fewer elements differ in the right one nevertheless.
+    model = dynx.load("panda", base="floating")
+    joint = model.joint("panda_joint3")
+    x, y, z = joint.origin.xyz
+    changed = with_joint(model, replace(joint, origin=Pose((x + 0.057, y, z), joint.origin.rpy)))
+    report = same_robot(model, with_moved_frames(changed, np.random.default_rng(seed)))
+    assert [(each.theirs, each.part) for each in report.differences] == [("panda_joint3", "origin")]
+
+
 def test_what_is_not_read_is_said_not_to_be_compared() -> None:
     model = dynx.load("planar_2r")
     text = model.to_mjcf()
