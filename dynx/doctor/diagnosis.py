@@ -754,6 +754,8 @@ def _stated_effects(
             output = examination.outputs[engine]
             errors = examination.errors(engine)
             quantity = max(errors, key=lambda name: errors[name], default=None)
+            if output.refused is not None and not rule.stated_refusal:
+                continue
             if output.no_results is not None:
                 effect = Effect(output.missing, float("inf"))
             elif quantity is not None and errors[quantity] > tolerance:

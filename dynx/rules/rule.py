@@ -132,6 +132,9 @@ class Rule(ABC):
     and is not proved; a test shows it on the trap, beside the same file without the cause.
     """
 
+    stated_refusal: ClassVar[bool] = False
+    """True if an engine refuses the file for a `stated` cause."""
+
     stated_bound: ClassVar[float] = float("inf")
     """Largest error that a `stated` cause accounts for."""
 

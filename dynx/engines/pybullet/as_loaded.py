@@ -281,7 +281,7 @@ class LoadedPyBullet(LoadedRobot):
     def _set(self, client: LoadedClient, calls: Collection[str]) -> None:
         client.apply(disable_simulation_settings)
         if "pybullet.set_inertias" in calls:
-            client.apply(set_inertias(self._model, self._links, restored=self._form != "mjcf"))
+            client.apply(set_inertias(self._model, self._links, restored=self._form == "urdf"))
         client.apply(set_joints({_text(client.joints[k][1]): k for k in client.moving}, calls))
 
     @classmethod

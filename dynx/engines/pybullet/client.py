@@ -15,6 +15,7 @@ steps of unit length. Joint damping and joint limits of the file stay as loaded.
 
 from __future__ import annotations
 
+import re
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -434,6 +435,13 @@ class CanonicalClient(RobotClient):
 Setting = Callable[["LoadedClient"], None]
 
 
+_SOURCE_PLACE = re.compile(r"b3(?:Error|Warning)\[[^\]]*\]:?")
+"""Place in Bullet's source that precedes a message."""
+
+_MAX_TOLD = 200
+"""Largest number of characters of Bullet's messages, from the end, in an error."""
+
+
 class LoadedClient(RobotClient):
     """One robot as `loadURDF`, `loadMJCF` or `loadSDF` loads it."""
 
@@ -534,11 +542,20 @@ class LoadedClient(RobotClient):
     def _load_from(self, path: Path) -> None:
         options = {"useFixedBase": self._fixed, "flags": self._flags}
         self.messages.clear()
+        refusal: EngineError | None = None
         with capture_output(self.messages):
             if self._function == "loadURDF":
                 self.body = int(self.call(self.engine.loadURDF, str(path), **options))
                 return
-            bodies = self.call(getattr(self.engine, self._function), str(path))
+            try:
+                bodies = self.call(getattr(self.engine, self._function), str(path))
+            except EngineError as error:
+                refusal = error
+                bodies = ()
+        if refusal is not None:
+            # Bullet prints the reason, and raises an exception without one.
+            told = " ".join(_SOURCE_PLACE.sub(" ", " ".join(self.messages)).split())
+            raise EngineError(f"{refusal} {told[-_MAX_TOLD:]}".rstrip()) from refusal
         if not bodies:
             raise EngineError(f"pybullet loads no body by {self._function} from {path.name}")
         self.body = max(map(int, bodies), key=self._count_known)

@@ -15,7 +15,8 @@ class ArmatureInMassMatrix(CallingRule):
     """DX309 armature-in-mass-matrix: A joint has an armature, which some engines add to the mass matrix and
     others leave out.
 
-    ``<joint armature="0.01"/>`` is the inertia of a rotor, as it acts at the joint.
+    ``<joint armature="0.01"/>`` of MJCF is the inertia of a rotor, as it acts at the joint. SDF has it as
+    ``<drake:rotor_inertia>``, behind a gear of ``<drake:gear_ratio>``.
 
     - MuJoCo 4.0 adds it to the diagonal of the mass matrix, and to inverse and forward dynamics.
     - Pinocchio 4.1 (``buildModelFromMJCF``) keeps it in ``model.armature``, which ``crba``, ``rnea`` and
@@ -32,7 +33,7 @@ class ArmatureInMassMatrix(CallingRule):
     armature from each engine.
     """
 
-    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf", "sdf")
     advice = "Decide whether rotors belong to the robot, and configure each engine accordingly."
     engines = measured_on("pinocchio", "mujoco", "drake")
     calls = ("pinocchio.no_armature", "mujoco.no_armature", "drake.no_rotors")

@@ -304,6 +304,7 @@ class FrameOfBodies(Rule):
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
     stated = True
+    stated_refusal = True
     advice = "Write the bodies with their own poses (dynx convert --to mjcf)."
     engines = measured_on("pinocchio", "drake", "pybullet")
 
