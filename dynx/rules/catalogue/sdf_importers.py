@@ -55,9 +55,9 @@ class InertiaFromShapesOfSdf(CallingRule):
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield links with a mass, but for a file in which all moments are those of boxes."""
         for link in _parts(case, "link"):
-            inertial = link.first("inertial")
-            if inertial is not None and not _is_box(case, link):
-                yield _found(link, inertial, "the link has moments of its own")
+            # A link without an inertial has 1 kg and 1 kg m^2 by the format.
+            if not _is_box(case, link):
+                yield _found(link, link.first("inertial") or link, "the link has moments of its own")
 
 
 def _is_box(case: Case, link: SourceElement) -> bool:
