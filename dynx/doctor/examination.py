@@ -178,9 +178,10 @@ def temporary_document(source: XmlSource, *, mesh_boxes: bool = False) -> Iterat
 
 
 def _folders_above(text: str) -> int:
-    """Return the number of folders above a document in which it names files; of its includes it is not
-    known."""
-    if "<include" in text:
+    """Return the number of folders above a document in which it names files; of its includes and of URIs,
+    such as ``model://arm/arm.stl``, it is not known.
+    """
+    if "<include" in text or "://" in text:
         return _FOLDERS_ABOVE
     return min(max((len(each) // 3 for each in _ABOVE.findall(text)), default=0), _FOLDERS_ABOVE)
 

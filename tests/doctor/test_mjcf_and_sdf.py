@@ -175,6 +175,24 @@ def test_included_files_are_found_from_the_copy_that_engines_load(tmp_path: Path
     assert dynx.load(robot).total_mass == report.total_mass
 
 
+def test_meshes_by_uri_are_found_from_the_copy_that_engines_load(tmp_path: Path) -> None:
+    if "pybullet" not in installed_engines():
+        pytest.skip("needs PyBullet")
+    folder = tmp_path / "crate"
+    folder.mkdir()
+    (tmp_path / "package.xml").write_text("<package/>")
+    (folder / "crate.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    text = trap_case("DX701").source.text
+    start, end = text.index("<box><size>1 1 1"), text.index("</box>", text.index("<box><size>1 1 1"))
+    mesh = "<mesh><uri>model://crate/crate.obj</uri></mesh>"
+    (folder / "model.sdf").write_text(text[:start] + mesh + text[end + len("</box>") :])
+    report = compare_as_loaded(folder / "model.sdf", engines=["pybullet"], samples=1)
+    assert report.error is None
+    assert report.engines[0].refused is None, report.engines[0].refused
+
+
 def test_a_copy_keeps_the_format_of_the_document() -> None:
     for text, suffix in (("<robot/>", ".urdf"), ("<mujoco/>", ".xml"), ("<sdf/>", ".sdf")):
         with temporary_document(XmlSource(text)) as path:
