@@ -21,6 +21,7 @@ from dynx.cli.shell.output import (
     write_json,
 )
 from dynx.errors import ArgumentError, nearest, shown
+from dynx.files.writing import refuse_links
 from dynx.model.conversion import (
     SUFFIXES,
     Conversion,
@@ -153,6 +154,7 @@ def _check_free(out: str, found: Conversion, model: Model, *, overwrite: bool) -
 
     Meshes and images that exist with the same content are left as they are.
     """
+    refuse_links(Path(out).parent, found.files)
     equal = {
         path
         for path, content in zip(_paths(out, found)[1:], found.files.values(), strict=True)

@@ -36,7 +36,7 @@ from dynx.cli.shell.output import (
 from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
 from dynx.errors import ArgumentError, DynxError, nearest, shown
 from dynx.files.figures import new_figure, picture_format, save_figure
-from dynx.files.writing import write_bytes
+from dynx.files.writing import refuse_links, write_bytes
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.registry import installed_worlds
 from dynx.world import World
@@ -93,6 +93,8 @@ def world(
     chosen = engines or installed_worlds()
     described = read_scene(scene, keyframe=keyframe)
     given = settings_by_engine(chosen, settings)
+    for engine in chosen if save_path is not None else ():
+        own_path(save_path, engine, len(chosen))  # Before the run, not after it.
     errors: list[DynxError | None] = []
 
     def save(world: World) -> None:
@@ -583,8 +585,10 @@ def _mjcf(
 
 
 def own_path(path: str, name: str, count: int) -> str:
-    """Return the file of one of several: its name stands before the suffix."""
+    """Return the file of one of several: its name stands before the suffix. ArgumentError for a link."""
     if count == 1:
         return path
     file = Path(path)
-    return str(file.with_name(f"{file.stem}.{name}{file.suffix}"))
+    own = file.with_name(f"{file.stem}.{name}{file.suffix}")
+    refuse_links(own.parent, [own.name])
+    return str(own)

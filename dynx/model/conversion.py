@@ -19,7 +19,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, DynxError, UnknownNameError, nearest, shown
 from dynx.files.reading import read_file
 from dynx.files.temporary import temporary_folder
-from dynx.files.writing import write_bytes
+from dynx.files.writing import refuse_links, write_bytes
 from dynx.model.document_format import Format
 from dynx.model.elements import Frame, Inertial, Joint, Pose
 from dynx.model.geometry import (
@@ -145,8 +145,10 @@ def without_collision_faults(model: Model) -> Model:
 def write_document(path: Path, text: str, files: Mapping[str, bytes], *, sync: bool = True) -> list[str]:
     """Write a document and the files beside it; return their paths, the document last.
 
-    A file beside it that has its content already is left as it is.
+    A file beside it that has its content already is left as it is. Raises ArgumentError where a link is in
+    the place of such a file or its folder, and for a path that cannot be written.
     """
+    refuse_links(path.parent, files)
     written = []
     for name, content in files.items():
         file = path.parent / name

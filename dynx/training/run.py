@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +13,13 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 from dynx.files.documents import json_text, parse_json
 from dynx.files.reading import checked_path, read_file
-from dynx.files.writing import write_text
+from dynx.files.writing import refuse_links, write_text
 from dynx.model.numbers import whole_number
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.environments import make
 from dynx.training.evaluation import AT_ONCE, MAX_EPISODES, Evaluation
 from dynx.training.file_tasks import of_earlier_version
-from dynx.training.learning import Learning, Progress, Schedule
+from dynx.training.learning import BEST, CURVE, EVALUATIONS, FINAL, TENSORBOARD, Learning, Progress, Schedule
 from dynx.training.library import new_algorithm, set_threads
 from dynx.training.policy import Policy
 from dynx.training.specification import TrainingSpec, read_spec, spec_document
@@ -126,21 +126,27 @@ def _checked_schema(place: Path, spec: TrainingSpec, resume: bool) -> str:
     if not os.path.exists(place / RUN):
         if resume:
             raise ArgumentError(f"{shown(place, 300)} has no training run that could be resumed")
+        written = (RUN, EVALUATIONS, CURVE, BEST, FINAL, TENSORBOARD, "checkpoints")
+        refuse_links(place, written)
+        refuse_links(place, _names(place, "checkpoints/*"))
         return SCHEMA
     if not resume:
         raise ArgumentError(
             f"{shown(place, 300)} has a training run already; resume it (--resume) or name another folder"
         )
     # One after the other: a link is found before what is behind it is read.
-    entries = (each for pattern in ("*", "checkpoints/*") for each in place.glob(pattern))
-    linked = next((each for each in entries if each.is_symlink()), None)
-    if linked is not None:
-        raise ArgumentError(f"{shown(linked, 300)} is a link, through which the run would write; remove it")
+    refuse_links(place, _names(place, "*", "checkpoints/*"))
     known, schema = _read_run(place)
     difference = spec.obstacle_to_continuing(known)
     if difference is not None:
         raise ArgumentError(f"{shown(place, 300)} has another run: {difference}")
     return schema
+
+
+def _names(place: Path, *patterns: str) -> Iterator[str]:
+    """Yield the relative paths of what matches patterns in a folder."""
+    for pattern in patterns:
+        yield from (str(each.relative_to(place)) for each in place.glob(pattern))
 
 
 def _write_run(place: Path, spec: TrainingSpec, schema: str) -> None:

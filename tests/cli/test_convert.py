@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,9 @@ from click.testing import CliRunner, Result
 
 import dynx
 from dynx.cli.shell.main import cli
+from dynx.errors import ArgumentError
 from dynx.model import Pose
-from dynx.model.conversion import robot_differences
+from dynx.model.conversion import convert, robot_differences
 from dynx.model.urdf.writer import urdf_text
 
 
@@ -148,3 +150,25 @@ def test_documents_of_one_name_share_equal_meshes(tmp_path: Path) -> None:
     assert result.exit_code == 2
     assert mesh.name in result.output
     assert mesh.read_bytes() == b"mine"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need a right")
+@pytest.mark.parametrize("inner", [False, True])
+def test_meshes_are_not_written_through_links(tmp_path: Path, inner: bool) -> None:
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    out = tmp_path / "x.xml"
+    if inner:
+        assert run("double_pendulum", "-o", out).exit_code == 0
+        mesh = next(path for path in (tmp_path / "x_assets").rglob("*") if path.is_file())
+        mesh.unlink()
+        mesh.symlink_to(outside / "new")
+    else:
+        (tmp_path / "x_assets").symlink_to(outside, target_is_directory=True)
+    result = run("double_pendulum", "-o", out, "--overwrite")
+    assert result.exit_code == 2
+    assert "is a link" in result.output
+    assert not list(outside.iterdir())
+    with pytest.raises(ArgumentError, match="is a link"):
+        convert(dynx.load("double_pendulum"), "mjcf", "x").write(out)
+    assert not list(outside.iterdir())

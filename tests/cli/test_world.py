@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import sys
 from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
@@ -306,3 +307,18 @@ def test_a_keyframe_that_is_not_there_is_refused(mjcf: str, scene: str) -> None:
         assert result.exit_code == 2
         assert message in result.stderr
         assert "Traceback" not in result.output
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need a right")
+def test_files_of_several_engines_or_bodies_are_not_written_through_links(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    write_scene(Scene("s", bodies=[box("a", (1.0, 1.0, 1.0)), box("b", (1.0, 1.0, 1.0))]), scene)
+    (tmp_path / "x.b.urdf").symlink_to(tmp_path / "other")
+    (tmp_path / "x.mujoco.world").symlink_to(tmp_path / "other")
+    for words in (
+        ("--export", str(tmp_path / "x.urdf"), "--engine", "mujoco"),
+        ("--save", str(tmp_path / "x.world"), "--engine", "pybullet,mujoco", "--duration", "0.01"),
+    ):
+        result = run(str(scene), *words)
+        assert (result.exit_code, "is a link" in result.output) == (2, True), result.output
+    assert not (tmp_path / "other").exists()

@@ -388,3 +388,13 @@ def test_lines_of_evaluations_may_be_anything(run: Path, tmp_path: Path) -> None
     ]
     (folder / "evaluations.jsonl").write_text("\n".join(lines))
     assert train(LONGER, folder, resume=True, schedule=OFTEN, final_episodes=1).resumed_at == 64
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no links")
+@pytest.mark.parametrize("name", ["run.json", "final.zip", "curve.jsonl", "checkpoints", "tensorboard"])
+def test_a_run_does_not_begin_through_links(name: str, tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / name).symlink_to(tmp_path / "outside")
+    with pytest.raises(ArgumentError, match=f"{name}' is a link"):
+        train(LONGER, tmp_path / "run")
+    assert not (tmp_path / "outside").exists()

@@ -25,7 +25,7 @@ from dynx.doctor.report import Counterexample, DoctorReport, Unexplained, result
 from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.documents import json_text
 from dynx.files.reading import read_file
-from dynx.files.writing import write_bytes, write_text
+from dynx.files.writing import refuse_links, write_bytes, write_text
 from dynx.model.expansion import RobotInput, is_library_name
 from dynx.model.loading import split_arguments
 from dynx.model.tree import Base
@@ -138,6 +138,7 @@ def save_counterexamples(folder: str, report: DoctorReport) -> Mapping[int, str]
             stem = os.path.basename(report.robot).removesuffix(".urdf")
             name = _file_name(f"{stem}-{report.base}-{each.engine}-{each.quantity}")
             path = os.path.normpath(os.path.join(folder, f"{name}.counterexample.urdf"))
+            refuse_links(os.path.dirname(path), [os.path.basename(path)])
             make_folder(path)
             write_text(path, _with_state(found, each))
             written[found.urdf] = path
@@ -188,7 +189,9 @@ def targets(inputs: Sequence[RobotInput], out: str, bases: Sequence[Base | None]
     if several or os.path.isdir(out) or out.endswith(("/", os.sep)):
         if os.path.lexists(out) and not os.path.isdir(out):
             raise ArgumentError(f"--fix {shown(out, 300)} is a file; several robots need a directory")
-        paths = [os.path.join(out, name) for name in _distinct_names(inputs)]
+        names = _distinct_names(inputs)
+        refuse_links(out, names)
+        paths = [os.path.join(out, name) for name in names]
     else:
         paths = [out]
         check_writable(out)
@@ -206,6 +209,8 @@ def targets(inputs: Sequence[RobotInput], out: str, bases: Sequence[Base | None]
         return paths
     ends = map(os.path.splitext, paths)
     found = [f"{stem}-{base}{suffix}" for stem, suffix in ends for base in bases]
+    for path in found:
+        refuse_links(os.path.dirname(path), [os.path.basename(path)])
     require_apart(found, (each.robot for each in inputs), "the file that is read")
     return found
 

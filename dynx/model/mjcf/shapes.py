@@ -125,6 +125,8 @@ class GeomReader:
         self._meshes: dict[str, Element] = {}
         self._assets: dict[str, MeshAsset] = {}
         self._fields: dict[str, Element] = {}
+        self._height_fields: dict[str, HeightField] = {}
+        self._points = 0
         for element in document.sections("asset"):
             if element.tag == "material":
                 self._materials[element.attributes.get("name", "")] = document.resolved(element, None)
@@ -359,22 +361,38 @@ class GeomReader:
             raise reading.error(
                 geom.element, f"{geom.what} names the height field {shown(name)}{nearest(name, self._fields)}"
             )
+        if name not in self._height_fields:
+            self._height_fields[name] = self._read_height_field(name)
+        return self._height_fields[name]
+
+    def _read_height_field(self, name: str) -> HeightField:
+        reading = self._reading
         element, what = self._fields[name], f"height field {shown(name)}"
         size_x, size_y, height, _ = reading.numbers(element, "size", what, 4)
         if "file" in element.attributes:
             heights = self._heights_of_file(element, what)
+            self._require_few_heights(element, what, heights.size)
         else:
             rows, columns = (self._whole(element, each, what) for each in ("nrow", "ncol"))
+            self._require_few_heights(element, what, rows * columns)
             heights = np.zeros((rows, columns))
             if "elevation" in element.attributes:
                 count = rows * columns
                 stated = reading.some_numbers(element, "elevation", what, count, count)
                 # The first row of the text is that of the largest y.
                 heights = np.array(stated).reshape(rows, columns)[::-1]
+        self._points += heights.size
         heights = heights - heights.min()
         if heights.max() > 0.0:
             heights = heights / heights.max()
         return HeightField(tuple(map(tuple, (height * heights).tolist())), (2.0 * size_x, 2.0 * size_y))
+
+    def _require_few_heights(self, element: Element, what: str, count: int) -> None:
+        """Raise DescriptionError for more points than MAX_HEIGHTS in all height fields that are used."""
+        if self._points + count > MAX_HEIGHTS:
+            raise self._reading.error(
+                element, f"the model has more than {MAX_HEIGHTS} heights; {what} has {count} of them"
+            )
 
     def _whole(self, element: Element, attribute: str, what: str) -> int:
         value = self._reading.number(element, attribute, what)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from io import StringIO
@@ -143,6 +144,28 @@ def test_a_counterexample_is_a_file_that_loads(tmp_path: Path) -> None:
     assert path.parent == folder
     assert load(path).frame_names == load(SMALL).frame_names
     assert "q = [0.5]" in path.read_text()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need a right")
+def test_a_counterexample_is_not_written_through_a_link(tmp_path: Path) -> None:
+    [name] = {Path(file).name for file in save_counterexamples(str(tmp_path), differing()).values()}
+    (tmp_path / name).unlink()
+    (tmp_path / name).symlink_to(tmp_path / "other")
+    with pytest.raises(ArgumentError, match="is a link"):
+        save_counterexamples(str(tmp_path), differing())
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need a right")
+@pytest.mark.parametrize("bases", [("fixed",), ("fixed", "floating")])
+def test_mended_files_are_not_written_through_links(tmp_path: Path, bases: tuple[Base, ...]) -> None:
+    inputs = [RobotInput(str(tmp_path / name), None) for name in ("a.urdf", "b.urdf")]
+    out = tmp_path / "out"
+    out.mkdir()
+    name = Path(planned_targets(inputs, str(out), in_place=False, bases=bases)[-1] or "").name
+    (out / name).symlink_to(tmp_path / "other")
+    with pytest.raises(ArgumentError, match="is a link"):
+        planned_targets(inputs, str(out), in_place=False, bases=bases)
 
 
 def test_a_folder_that_cannot_be_created_is_reported_and_the_rest_is_done(

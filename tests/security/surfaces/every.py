@@ -3,6 +3,7 @@
 from tests.security.attack import ATTACKS, TRAINING
 from tests.security.surfaces import (
     arrays,
+    converted,
     description,
     further_files,
     mesh,
@@ -23,6 +24,7 @@ __all__ = [
     "ATTACKS",
     "TRAINING",
     "arrays",
+    "converted",
     "description",
     "further_files",
     "mesh",

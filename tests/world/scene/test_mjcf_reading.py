@@ -232,6 +232,26 @@ def test_height_fields_of_images_have_the_heights_of_mujoco(tmp_path: Path, mode
     assert caught.value.line is not None
 
 
+@pytest.mark.parametrize("counts", [(10**6, 10**6), (2000, 1500)])
+def test_height_fields_are_bounded(counts: tuple[int, int]) -> None:
+    """Together, because a few lines may ask for any number of them."""
+    rows, columns = counts
+    fields = "".join(f'<hfield name="h{k}" nrow="{rows}" ncol="{columns}" size="1 1 1 1"/>' for k in range(2))
+    geoms = '<geom type="hfield" hfield="h{}"/>'
+    text = TWO.replace("<worldbody>", f"<asset>{fields}</asset><worldbody>")
+    both = "".join(map(geoms.format, range(2)))
+    with pytest.raises(DescriptionError, match="the model has more than 4000000 heights; height field 'h"):
+        read(text.replace("</worldbody>", f"{both}</worldbody>"))
+
+
+def test_geoms_of_one_height_field_share_its_heights() -> None:
+    asset = '<asset><hfield name="h" nrow="2000" ncol="1500" size="1 1 1 1"/></asset>'
+    geoms = "".join(f'<geom name="g{k}" type="hfield" hfield="h"/>' for k in range(2))
+    text = TWO.replace("<worldbody>", f"{asset}<worldbody>").replace("</worldbody>", f"{geoms}</worldbody>")
+    (first,), (second,) = (read(text).body(name).shapes for name in ("g0", "g1"))
+    assert first.shape == second.shape
+
+
 # -- contacts ---------------------------------------------------------------------------------------
 
 
