@@ -184,7 +184,7 @@ def _reduced_range(model: Model, indices: list[int], margin: Floats) -> tuple[Fl
         unit = "m" if joint.type == "prismatic" else "rad"
         raise ArgumentError(
             f"limit_margin {margin[at]:.6g} {unit} leaves joint {shown(joint.name)} no range: its limits are "
-            f"{model.lower[at]:.6g} and {model.upper[at]:.6g} {unit}"
+            f"{model.lower[at]:.6g} and {model.upper[at]:.6g} {unit}; wanted at most half of what is between"
         )
     return low, high
 
