@@ -169,3 +169,61 @@ def _(box: Box) -> Deed:
     box.file("m.xml", mjcf(FREE + FREE.replace('"b"', '"c"').replace("<geom", '<geom pos="9 9 9"')))
     (box.here / "out.c.urdf").symlink_to(box.outside / "secret.urdf")
     return Deed(("world", "m.xml", "--engine", "mujoco", "--duration", "0.002", "--export", "out.urdf"))
+
+
+def attaching(file: str, times: int = 1, inside: str = "") -> str:
+    """Return a model to which one of a file is attached, some times."""
+    attached = "".join(f'<attach model="s" body="b" prefix="p{k}_"/>' for k in range(times))
+    asset = f'<asset><model name="s" file="{file}"/></asset>'
+    return mjcf(f'<body name="b"><joint/><geom size="0.1"/>{attached}{inside}</body>', asset)
+
+
+@attack("path", "models attached from outside by folders and links")
+def _(box: Box) -> Deed:
+    (box.outside / "secret.xml").write_text(mjcf(FREE.replace('"b"', '"TOP-SECRET-7719"')))
+    (box.here / "a.xml").symlink_to(box.outside / "secret.xml")
+    models = "".join(
+        f'<model name="s{k}" file="{file}"/>'
+        for k, file in enumerate(("a.xml", "../outside/secret.xml", f"{box.outside}/secret.xml"))
+    )
+    attached = "".join(f'<attach model="s{k}" prefix="p{k}"/>' for k in range(3))
+    return run(box, mjcf(f'<body name="b">{attached}</body>', f"<asset>{models}</asset>"))
+
+
+@attack("recursion", "models attached to each other")
+def _(box: Box) -> Deed:
+    box.file("a.xml", attaching("m.xml"))
+    return run(box, attaching("a.xml"))
+
+
+@attack("recursion", "model attached to itself")
+def _(box: Box) -> Deed:
+    return run(box, attaching("m.xml"))
+
+
+@attack("recursion", "part of a model attached within itself")
+def _(box: Box) -> Deed:
+    return run(box, mjcf('<body name="b"><joint/><geom size="1"/><attach body="b" prefix="p"/></body>'))
+
+
+@attack("bomb", "attached models that double")
+def _(box: Box) -> Deed:
+    for k in range(40):
+        box.file(f"a{k}.xml", attaching(f"a{k + 1}.xml", 2) if k < 39 else mjcf(FREE))
+    return run(box, attaching("a0.xml", 2))
+
+
+@attack("bomb", "model of many bodies attached many times")
+def _(box: Box) -> Deed:
+    bodies = "".join(f'<body name="c{k}"><geom size="0.1"/></body>' for k in range(9_000))
+    box.file("a.xml", mjcf(f'<body name="b">{bodies}</body>'))
+    return run(box, attaching("a.xml", 5_000))
+
+
+@attack("bomb", "part attached to itself that doubles")
+def _(box: Box) -> Deed:
+    parts = '<body name="a0"><geom size="0.1"/></body>'
+    for k in range(1, 40):
+        twice = "".join(f'<frame><attach body="a{k - 1}" prefix="{side}{k}_"/></frame>' for side in "xy")
+        parts += f'<body name="a{k}">{twice}</body>'
+    return run(box, mjcf(parts))
