@@ -93,8 +93,9 @@ def world(
     chosen = engines or installed_worlds()
     described = read_scene(scene, keyframe=keyframe)
     given = settings_by_engine(chosen, settings)
-    for engine in chosen if save_path is not None else ():
-        own_path(save_path, engine, len(chosen))  # Before the run, not after it.
+    if save_path is not None:
+        for engine in chosen:
+            own_path(save_path, engine, len(chosen))  # Before the run, not after it.
     errors: list[DynxError | None] = []
 
     def save(world: World) -> None:
