@@ -21,7 +21,7 @@ from dynx.cli.shell.output import (
     write_json,
 )
 from dynx.errors import ArgumentError, nearest, shown
-from dynx.files.writing import refuse_links
+from dynx.files.links import refuse_links
 from dynx.model.conversion import (
     SUFFIXES,
     Conversion,

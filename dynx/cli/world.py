@@ -36,7 +36,8 @@ from dynx.cli.shell.output import (
 from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
 from dynx.errors import ArgumentError, DynxError, nearest, shown
 from dynx.files.figures import new_figure, picture_format, save_figure
-from dynx.files.writing import refuse_links, write_bytes
+from dynx.files.links import refuse_links
+from dynx.files.writing import write_bytes
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.registry import installed_worlds
 from dynx.world import World

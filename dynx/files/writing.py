@@ -10,9 +10,9 @@ import secrets
 import shutil
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import BinaryIO
 
 from dynx.errors import ArgumentError, shown
@@ -89,22 +89,6 @@ def write_bytes(path: str | os.PathLike[str], data: bytes, mode: int = 0o666, *,
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write `text`, which is ASCII, to `path` as `atomic_file` does."""
     write_bytes(path, text.encode("ascii"))
-
-
-def refuse_links(folder: str | os.PathLike[str], names: Iterable[str]) -> None:
-    """Raise ArgumentError for a file or folder in `folder` that is a symbolic link.
-
-    Only a path that the user names is followed. A link under a name that dynx chooses may be of somebody
-    else, and leads what is written to another place. `names` are relative paths.
-    """
-    for name in names:
-        path = Path(folder)
-        for part in PurePath(name).parts:
-            path /= part
-            if path.is_symlink():
-                raise ArgumentError(
-                    f"{shown(path, 300)} is a link, through which dynx would write; remove it"
-                )
 
 
 def clear_unfinished(folder: Path) -> None:

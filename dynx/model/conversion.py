@@ -17,9 +17,10 @@ import numpy as np
 
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, DynxError, UnknownNameError, nearest, shown
+from dynx.files.links import refuse_links
 from dynx.files.reading import read_file
 from dynx.files.temporary import temporary_folder
-from dynx.files.writing import refuse_links, write_bytes
+from dynx.files.writing import write_bytes
 from dynx.model.document_format import Format
 from dynx.model.elements import Frame, Inertial, Joint, Pose
 from dynx.model.geometry import (

@@ -12,8 +12,9 @@ from dynx._version import __version__
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 from dynx.files.documents import json_text, parse_json
+from dynx.files.links import refuse_links
 from dynx.files.reading import checked_path, read_file
-from dynx.files.writing import refuse_links, write_text
+from dynx.files.writing import write_text
 from dynx.model.numbers import whole_number
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.environments import make

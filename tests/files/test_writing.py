@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from dynx.errors import ArgumentError
-from dynx.files.writing import atomic_file, clear_unfinished, refuse_links, write_bytes
+from dynx.files.writing import atomic_file, clear_unfinished, write_bytes
 
 
 def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
@@ -146,19 +146,3 @@ def test_the_content_is_on_the_disk_before_the_file_gets_its_name(
     events.clear()
     write_bytes(tmp_path / "cached", b"12345", sync=False)
     assert events == ["renamed"]
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="links need a right")
-def test_links_under_names_of_dynx_are_refused_and_those_of_the_user_followed(tmp_path: Path) -> None:
-    outside = tmp_path / "outside"
-    outside.mkdir()
-    folder = tmp_path / "linked"
-    folder.symlink_to(tmp_path, target_is_directory=True)  # The user names it.
-    (tmp_path / "to_folder").symlink_to(outside, target_is_directory=True)
-    (tmp_path / "to_file").symlink_to(outside / "new")
-    (tmp_path / "own").mkdir()
-    (tmp_path / "own" / "inner").symlink_to(tmp_path / "nowhere")
-    refuse_links(folder, ["new", "own/new", "none/new", "outside"])
-    for name in ("to_folder", "to_folder/a/b", "to_file", "own/inner", "own/inner/c"):
-        with pytest.raises(ArgumentError, match=r"' is a link, through which dynx would write; remove it"):
-            refuse_links(folder, ["new", name])

@@ -24,8 +24,9 @@ from dynx.doctor.formats.baseline import Baseline
 from dynx.doctor.report import Counterexample, DoctorReport, Unexplained, results_document
 from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.documents import json_text
+from dynx.files.links import refuse_links
 from dynx.files.reading import read_file
-from dynx.files.writing import refuse_links, write_bytes, write_text
+from dynx.files.writing import write_bytes, write_text
 from dynx.model.expansion import RobotInput, is_library_name
 from dynx.model.loading import split_arguments
 from dynx.model.tree import Base
