@@ -783,7 +783,8 @@ def _with_stated(
 
 def _engines_without_remedy(mended: Case, rules: Sequence[Rule], engines: Collection[str]) -> set[str]:
     """Find the engines for which a cause remains that has no remedy or that the user chose to keep."""
-    causes = [rule for rule in rules if rule.kind == "difference"]
+    # What a stated omission accounts for is known apart (`_stated_effects`): it may be no refusal.
+    causes = [rule for rule in rules if rule.kind == "difference" and not rule.stated]
     left = detections(mended, causes)
     return {
         engine
