@@ -191,9 +191,9 @@ class SingularDirection(NamedTuple):
     """Unit vector (nv,) of the coordinates of all joints, mimic joints included."""
 
 
-def singular_direction(model: Model, q: Floats) -> SingularDirection | None:
+def singular_direction(model: Model, q: Floats, armature: Floats | None = None) -> SingularDirection | None:
     """Return the direction in which the mass matrix is almost singular at q (nq,); None where its condition
-    number is below `MIN_SINGULAR_CONDITION`.
+    number is below `MIN_SINGULAR_CONDITION`. It includes the `armature` (n,) of all joints, if one is given.
 
     Eigenvalues are computed only where a bound on the condition is large, because on a busy machine the
     threads of LAPACK wait for one another for tens of milliseconds.
@@ -201,12 +201,18 @@ def singular_direction(model: Model, q: Floats) -> SingularDirection | None:
     mechanism = model.mechanism
     if not mechanism.nv:
         return None
-    return _singular_direction(_Key(mechanism), _floats(mechanism.tree_q(q)).tobytes())
+    rotors = b"" if armature is None or not armature.any() else _floats(armature).tobytes()
+    return _singular_direction(_Key(mechanism), _floats(mechanism.tree_q(q)).tobytes(), rotors)
 
 
 @lru_cache(MAX_KNOWN)
-def _singular_direction(key: _Key, q: bytes) -> SingularDirection | None:
+def _singular_direction(key: _Key, q: bytes, armature: bytes) -> SingularDirection | None:
     M = mass_matrix_of_floats(key.mechanism, np.frombuffer(q))
+    if armature:
+        rotors = np.frombuffer(armature)
+        joints = np.arange(len(M) - len(rotors), len(M))
+        M = M.copy()
+        M[joints, joints] += rotors
     size = magnitudes_of_rows(M)
     scaled = M / (size[:, None] * size)
     if condition_bound(scaled) < MIN_SINGULAR_CONDITION:
@@ -222,10 +228,10 @@ def _singular_direction(key: _Key, q: bytes) -> SingularDirection | None:
     return SingularDirection(condition, bool(_is_null(values)[smallest]), direction)
 
 
-def refuse_singular_start(model: Model, q: Floats, remedy: str) -> None:
-    """Raise SingularMassMatrixError, naming the joints and a remedy, if M is singular to rounding at the
-    start q (nq,)."""
-    found = singular_direction(model, q) if model.mechanism.bodies else None
+def refuse_singular_start(model: Model, q: Floats, armature: Floats, remedy: str) -> None:
+    """Raise SingularMassMatrixError, naming the joints and a remedy, if M with the `armature` (n,) of all
+    joints is singular to rounding at the start q (nq,)."""
+    found = singular_direction(model, q, armature) if model.mechanism.bodies else None
     if found is not None and found.to_rounding:
         joints = " and ".join(map(shown, main_joints(model, found.direction))) or "its base"
         raise singular_matrix(

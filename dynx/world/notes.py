@@ -76,7 +76,7 @@ def unbounded_motions(layout: Layout, state: WorldState) -> Iterator[str]:
         model = robot.model
         if not model.mechanism.bodies:
             continue
-        found = singular_direction(model, state.robots[robot.name].q)
+        found = singular_direction(model, state.robots[robot.name].q, robot.armature)
         if found is not None:
             joints = [shown(f"{robot.name}/{name}") for name in main_joints(model, found.direction)]
             yield (

@@ -130,6 +130,8 @@ def test_results_that_are_kept_are_of_the_configuration_and_the_robot() -> None:
     for _ in range(2):
         assert singular_direction(model, q) is None
         assert singular_direction(massless, q) is not None
+        assert singular_direction(massless, q, np.array([0.1, 0.2])) is None
+        assert singular_direction(massless, q, np.array([0.1, 0.0])) is not None
     redundant = pointed()
     first, again = (singular_direction(redundant, np.array([0.3, 0.6, 0.2])) for _ in range(2))
     assert first is not None

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import dynx
+from dynx.errors import SingularMassMatrixError
 from dynx.model.elements import JointDynamics
 from dynx.model.tree import Base
 from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, World, ground
@@ -35,6 +36,33 @@ def world_of(text: str, engine: str, dynamics: str, q: float = 0.0, **options: b
     robot = SceneRobot("robot", dynx.load(text.format(dynamics)), q=(q,))
     floor = replace(ground(), pose=dynx.Pose((0.0, 0.0, -2.0)))
     return World(Scene("joint", robots=(robot,), bodies=(floor,)), engine, 1e-3, **options)
+
+
+TWO_JOINTS = """<robot name="rotor"><link name="base"/><link name="shaft"/>
+  <link name="disk"><inertial><mass value="1"/>
+    <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="first" type="continuous"><parent link="base"/><child link="shaft"/><axis xyz="0 1 0"/></joint>
+  <joint name="second" type="continuous"><parent link="shaft"/><child link="disk"/><axis xyz="0 1 0"/>
+    <dynamics armature="0.02"/></joint>
+</robot>"""
+"""Joints about one axis without an inertia between them: only the armature decides how each of them moves."""
+
+
+@pytest.mark.parametrize("engine", sorted({*WORLDS} - {"pybullet"}))
+@pytest.mark.parametrize("options", [{}, {"joint_armature": False}])
+def test_a_mass_matrix_that_armature_makes_regular_is_that_of_the_world(
+    engine: str, options: dict[str, Any]
+) -> None:
+    """M = [[0.1, 0.1], [0.1, 0.12]] turns 0.02 N m at the second joint into -1 and 1 rad/s^2."""
+    scene = Scene("rotor", robots=(SceneRobot("robot", dynx.load(TWO_JOINTS)),), gravity=(0.0, 0.0, 0.0))
+    if options:
+        with pytest.raises(SingularMassMatrixError, match="'first', 'second'"):
+            World(scene, engine, 1e-3, **options)
+        return
+    with World(scene, engine, 1e-3) as world:
+        world.step(1000, {"robot": [0.0, 0.02]})
+        assert world.state.robots["robot"].v == pytest.approx([-1.0, 1.0], rel=1e-9)
+        assert not world.notes
 
 
 @pytest.mark.parametrize("engine", WORLDS)

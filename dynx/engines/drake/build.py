@@ -292,7 +292,7 @@ def _add_robot(
     plant: Any, number: int, robot: RobotLayout, carriers: dict[Owner, Carrier]
 ) -> tuple[Any, list[Any]]:
     """Add the bodies and joints of a robot; return the joint of a floating base, or None, and the others."""
-    Solvability(robot.model).refuse_singular(joint_dynamics=False)
+    Solvability(robot.model).refuse_singular(joint_dynamics=bool(robot.armature.any()))
     if robot.friction.any():
         raise UnsupportedFeatureError(
             f"{shown(robot.name)} has joints with dry friction, which 'drake' does not have"

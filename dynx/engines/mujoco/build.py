@@ -188,10 +188,10 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
             f"the scene {layout.name} has {total} degrees of freedom; 'mujoco' takes at most {MAX_NV}"
         )
     for robot in layout.robots:
-        Solvability(robot.model).refuse_singular(joint_dynamics=False)
+        Solvability(robot.model).refuse_singular(joint_dynamics=bool(robot.armature.any()))
         if settings["solver"] != "pgs":
             # The other solvers minimise a function that is not convex for such a mass matrix.
-            refuse_singular_start(robot.model, robot.q, "use solver='pgs'")
+            refuse_singular_start(robot.model, robot.q, robot.armature, "use solver='pgs'")
     document = MjcfDocument(layout, dt, settings)
     model = mujoco.MjModel.from_xml_string(document.text())
     data = silent_data(model)
