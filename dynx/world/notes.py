@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dynx.backends.solvability import main_joints, singular_direction
+from dynx.backends.singular_direction import main_joints, singular_direction
 from dynx.errors import DynxError, shown
 from dynx.model.elements import IDENTITY, Vector
 from dynx.model.mechanism import ROOT, Mechanism

@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from dynx.backends.solvability import Solvability, refuse_singular_start
+from dynx.backends.singular_direction import refuse_singular_start
+from dynx.backends.solvability import Solvability
 from dynx.engines.mujoco.library import MAX_DEPTH, mujoco, silence_warnings, silent_data
 from dynx.engines.mujoco.materials import ContactMaterials
 from dynx.engines.mujoco.mjcf import SUBSTITUTE, MjcfDocument
