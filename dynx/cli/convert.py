@@ -25,12 +25,12 @@ from dynx.files.links import refuse_links
 from dynx.model.conversion import (
     SUFFIXES,
     Conversion,
-    Format,
     holds,
     without_collision_faults,
     without_shapes,
 )
 from dynx.model.conversion import convert as convert_model
+from dynx.model.document_format import Format
 from dynx.model.geometry import Mesh
 from dynx.model.loading import split_arguments
 from dynx.model.model import Model
