@@ -137,7 +137,8 @@ class Link:
     @property
     def is_empty(self) -> bool:
         """Whether the link only names a place."""
-        return not self.shapes and (self.inertial is None or self.inertial.mass == 0.0)
+        own = self.inertial
+        return not self.shapes and (own is None or not (own.mass or own.tensor.any()))
 
 
 @dataclass
