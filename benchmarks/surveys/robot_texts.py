@@ -663,7 +663,8 @@ def write_sdf(robot: Robot, floating: bool, style: Style | None = None) -> str:
         raise ValueError("a link world that moves")
 
     def place(parent: ET.Element, T: Matrix, relative_to: str = "") -> None:
-        if not style.spelled and np.all(np.eye(4) == T):
+        # A link without pose stands at the origin of the model, whatever carries its joint.
+        if not style.spelled and not relative_to and np.all(np.eye(4) == T):
             return
         element = ET.SubElement(parent, "pose")
         if relative_to:
