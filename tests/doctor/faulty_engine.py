@@ -13,6 +13,7 @@ from dynx.doctor.examination import Examination, Examiner, model_without_mimics
 from dynx.errors import EngineError
 from dynx.loaded import LoadedModel, LoadedRobot
 from dynx.model import Inertial, Model
+from dynx.model.document_format import Format
 from dynx.model.xml.source import XmlSource
 from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Case
@@ -48,7 +49,7 @@ class FaultyEngine(LoadedRobot):
         return "3.2.7"
 
     @classmethod
-    def load_call(cls, floating: bool, root: str | None = None) -> str:
+    def load_call(cls, floating: bool, root: str | None = None, form: Format = "urdf") -> str:
         """Return a placeholder."""
         return "load(path)"
 

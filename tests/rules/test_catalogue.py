@@ -125,7 +125,7 @@ def test_detections_say_where_and_what(rule: Rule) -> None:
     case = trap_case(rule)
     text = case.source.text.splitlines()
     for each in rule.detect(case):
-        links, joints = case.links.keys(), case.joints.keys()
+        links, joints = set(case.links), set(case.joints)
         if case.form != "urdf":
             links = {link.name for link in case.model.links}
             joints = {joint.name for joint in case.model.joints}

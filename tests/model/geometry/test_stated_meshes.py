@@ -11,7 +11,8 @@ import pytest
 import dynx
 from dynx.errors import ArgumentError, DescriptionError, ShapeError
 from dynx.model import Link, Model
-from dynx.model.conversion import Format, convert
+from dynx.model.conversion import convert
+from dynx.model.document_format import Format
 from dynx.model.geometry import Appearance, Collision, Geometry, LinkGeometry, Mesh, Visual, solid_properties
 from dynx.model.geometry.convex_pieces import mesh_objects
 from dynx.model.geometry.drawn_shapes import colliding_geometry, coloured_shapes, look_notes
