@@ -68,12 +68,16 @@ def _own_candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterato
         mine = named.get(theirs.model.links[k].name)
         if mine is not None:
             yield rounded(ours.link_pose(mine)) @ inverse(rounded(theirs.link_pose(k)))
-    first, second = ours.inertias[a], theirs.inertias[b]
-    frames = zip(_frames(ours, a, first), _frames(theirs, b, second), strict=False)
-    for mine_frames, their_frames in frames:
-        for mine_frame in mine_frames[:1]:
-            for their_frame in their_frames:
-                yield mine_frame @ inverse(their_frame)
+    pairs = [(ours.inertias[a], theirs.inertias[b])]
+    if a == b == ROOT:
+        # The centre of mass moves where a part of the inertia is stated in another body.
+        pairs.append((ours.grouped_root, theirs.grouped_root))
+    for first, second in pairs:
+        frames = zip(_frames(ours, a, first), _frames(theirs, b, second), strict=False)
+        for mine_frames, their_frames in frames:
+            for mine_frame in mine_frames[:1]:
+                for their_frame in their_frames:
+                    yield mine_frame @ inverse(their_frame)
 
 
 def _frames(skeleton: Skeleton, body: int, inertia: RigidInertia) -> Iterator[list[Floats]]:

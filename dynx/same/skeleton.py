@@ -16,6 +16,7 @@ from dynx.same.scales import Whole
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import skew
 
 
 def without_standing_mimics(model: Model) -> Model:
@@ -91,6 +92,30 @@ class Skeleton:
     def inertias(self) -> dict[int, RigidInertia]:
         """Merged inertias in float64."""
         return {body: float_inertia(self.inertia(body)) for body in self.children}
+
+    @cached_property
+    def grouped_root(self) -> RigidInertia:
+        """Inertia of the root body in float64, with all of the other bodies that may as well be the parent's.
+
+        Of a body on a revolute joint that is its mass, its first moment along the axis, and the mean of its
+        moments about the axes across; of one on a prismatic joint its tensor about the centre of mass
+        (Gautier and Khalil 1990). An exchange of inertia that no state shows leaves it as it is.
+        """
+        total = dict(self.inertias)
+        for number in reversed(range(len(self.bodies))):
+            inertia, axis, T = total[number], self.axes[number], self.placements[number]
+            along = np.outer(axis, axis)
+            if self.bodies[number].revolute:
+                tensor = inertia.rotational_inertia
+                across = (np.trace(tensor) - axis @ tensor @ axis) / 2.0 * (np.eye(3) - along)
+                moved = RigidInertia(inertia.mass, along @ inertia.first_moment, across)
+            else:
+                mass, H = float(inertia.mass), skew(inertia.first_moment)
+                central = inertia.rotational_inertia + (H @ H / mass if mass else 0.0)
+                moved = RigidInertia(np.zeros(()), np.zeros(3), central)
+            parent = self.bodies[number].parent
+            total[parent] = total[parent] + moved.transform(T[:3, :3], T[:3, 3])
+        return total[ROOT]
 
     def link_pose(self, link: int) -> Array:
         """Return the pose (4, 4) of a link, by its number, in the frame of its body, in 50 digits."""

@@ -55,8 +55,6 @@ SIZE = (480, 360)
 
 _OPAQUE_ORANGE: Colour = (ORANGE[0] / 255.0, ORANGE[1] / 255.0, ORANGE[2] / 255.0, 1.0)
 
-_AXES_LEGEND = "x red, y green, z blue"
-
 _STICK_RADIUS = 0.015
 """Radius of the sticks of a robot without shapes, as a share of its size."""
 
@@ -164,8 +162,7 @@ def picture_of(
     )
     rgb = drawing.rgb.reshape(camera.size[1], camera.size[0], 3)
     rgb = write_words(rgb, beside.words, camera)
-    caption = [stage.caption, *([_AXES_LEGEND] if beside.axes else [])]
-    return write_caption(rgb, "; ".join(caption)) if stage.caption else rgb
+    return write_caption(rgb, "; ".join([stage.caption, *beside.legends])) if stage.caption else rgb
 
 
 def write_picture(path: str | os.PathLike[str], rgb: NDArray[np.uint8]) -> None:

@@ -98,8 +98,16 @@ class _Letters:
 
     def write_in_corner(self, text: str) -> None:
         font = ImageFont.load_default(1.1 * self._size)
-        left, top, right, bottom = self._draw.textbbox((0, 0), text, font=font)
         gap, border = 0.8 * self._size, 0.4 * self._size
+        lines = [""]
+        for clause in text.split("; "):
+            longer = f"{lines[-1]}; {clause}" if lines[-1] else clause
+            if self._draw.textlength(longer, font=font) <= self._width - 2.0 * (gap + border):
+                lines[-1] = longer
+            else:
+                lines.append(clause)
+        text = "\n".join(line for line in lines if line)
+        left, top, right, bottom = self._draw.textbbox((0, 0), text, font=font)
         x, y = self._width - gap - border - (right - left), self._height - gap - border - (bottom - top)
         box = (x - border, y - border, x + right - left + border, y + bottom - top + border)
         self._draw.rounded_rectangle(box, radius=border, fill=(255, 255, 255, 150))

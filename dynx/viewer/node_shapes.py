@@ -28,6 +28,15 @@ _PARTS = re.compile(r"/(motion|second|robot|world)(/.*)?/(visual|shape|stick)\d+
 _AXES = ((0.90, 0.05, 0.05), (0.05, 0.65, 0.05), (0.05, 0.20, 0.95))
 """Colours of the x, y and z axes of frames."""
 
+_AXES_LEGEND = "x red, y green, z blue"
+
+_LEGENDS = {
+    "/inertia_ellipsoid": "ellipsoids: inertia of the links",
+    "/inertia_box": "boxes: inertia of the links",
+    "/center": "balls: centres of mass",
+}
+"""What marks mean, by the ends of their paths."""
+
 Colour = tuple[float, float, float, float]
 
 
@@ -49,6 +58,8 @@ class NodeShapes(NamedTuple):
     words: tuple[Words, ...] = ()
     axes: tuple[DrawnShape, ...] = ()
     """Axes of frames, which are seen through the parts in which they lie."""
+    legends: tuple[str, ...] = ()
+    """What marks and their colours mean, for the caption."""
 
 
 def node_shapes(page: Page, camera: Camera, *, collisions: bool = False) -> NodeShapes:
@@ -77,6 +88,7 @@ def node_shapes(page: Page, camera: Camera, *, collisions: bool = False) -> Node
     shapes: list[DrawnShape] = []
     words: list[Words] = []
     axes: list[DrawnShape] = []
+    legends: dict[str, None] = {}
     for path, node in nodes.items():
         if _PARTS.search(path) or ("/collision" in path and not collisions):
             continue
@@ -87,7 +99,10 @@ def node_shapes(page: Page, camera: Camera, *, collisions: bool = False) -> Node
             words.append(Words(node.text, T[:3, 3]))
         else:
             (axes if hasattr(node, "axes_length") else shapes).extend(_surfaces(node, T, camera))
-    return NodeShapes(tuple(shapes), tuple(words), tuple(axes))
+            legends.update((legend, None) for end, legend in _LEGENDS.items() if path.endswith(end))
+    if axes:
+        legends[_AXES_LEGEND] = None
+    return NodeShapes(tuple(shapes), tuple(words), tuple(axes), tuple(legends))
 
 
 def _surfaces(node: Any, T: Floats, camera: Camera) -> Iterator[DrawnShape]:

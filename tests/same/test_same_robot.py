@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.model import Model
-from dynx.model.elements import Inertial, Joint, Link, Mimic, Pose
+from dynx.model.elements import Inertial, Joint, JointType, Link, Mimic, Pose
 from dynx.model.library import find
 from dynx.same import SameReport, same_robot
 from dynx.testing import assert_same_robot
 from dynx.testing.strategies import models
 from tests.same.planted import Planted, other_mass, plantings, with_inertial, with_joint
 from tests.same.rewrites import (
+    merged,
     rebuilt,
     with_flipped_axes,
     with_merged_links,
@@ -192,6 +193,54 @@ def test_inertia_that_no_state_shows_is_no_difference() -> None:
     assert not same_robot(arm, beside).same
 
 
+@SLOW
+@given(
+    st.sampled_from(["continuous", "prismatic"]),
+    st.integers(1, 3),
+    st.floats(-0.2, 0.5),
+    st.integers(0, 10**6),
+)
+def test_inertia_exchanged_on_a_floating_robot_whose_frames_are_moved_is_no_difference(
+    kind: JointType, count: int, mass: float, seed: int
+) -> None:
+    """A joint says where its axis is; of the turn about it only what is seen of the inertia does."""
+    rng = np.random.default_rng(seed)
+    names = [f"link_{k}" for k in range(count + 1)]
+    axes = [rng.standard_normal(3) for _ in range(count)]
+    places = [Pose(tuple(rng.uniform(-0.3, 0.3, 3)), tuple(rng.uniform(-1.0, 1.0, 3))) for _ in axes]
+    links = [Link(name, random_body(rng)) for name in names]
+    joints = [
+        Joint(f"joint_{k}", kind, names[k], names[k + 1], places[k], tuple(axis / np.linalg.norm(axis)))
+        for k, axis in enumerate(axes)
+    ]
+    model = Model.build("chain", links, joints, base="floating")
+    exchanged = model
+    for joint in model.joints:
+        if kind == "prismatic":
+            # A tensor may belong to either body: it never turns against the other.
+            upper = lower = Inertial(0.0, ixx=mass * 0.01, iyy=mass * 0.02, izz=mass * 0.015)
+            upper = replace(upper, origin=Pose(rpy=joint.origin.rpy))
+        else:
+            on_axis = np.array(joint.axis) * rng.uniform(-0.3, 0.3)
+            lower = Inertial(mass, Pose(tuple(on_axis)))
+            upper = Inertial(mass, Pose(tuple((joint.origin.matrix @ [*on_axis, 1.0])[:3])))
+        other = Inertial(-lower.mass, lower.origin, -lower.ixx, iyy=-lower.iyy, izz=-lower.izz)
+        for link, part in ((joint.parent, upper), (joint.child, other)):
+            exchanged = with_inertial(exchanged, link, merged(exchanged.inertial(link), part))
+    report = same_robot(model, with_moved_frames(exchanged, rng))
+    assert report.same, report.differences
+
+
+def random_body(rng: np.random.Generator) -> Inertial:
+    """Return the inertial of four random points of mass, in other axes."""
+    points = rng.uniform(-0.3, 0.3, (4, 3))
+    masses = rng.uniform(0.5, 1.0, 4)
+    body = Inertial(masses[0], Pose(tuple(points[0])))
+    for mass, point in zip(masses[1:], points[1:], strict=True):
+        body = point_added(body, float(mass), tuple(point))
+    return body
+
+
 def two_links(tilt: float) -> Model:
     """Return an arm of two links, whose first joint leans against gravity."""
     body = Inertial(1.0, Pose((0.2, 0.05, 0.1)), 0.02, 0.001, 0.002, 0.03, 0.003, 0.04)
@@ -212,8 +261,6 @@ def two_links(tilt: float) -> Model:
 
 def point_added(inertial: Inertial, mass: float, at: tuple[float, float, float]) -> Inertial:
     """Return an inertial with a point mass more."""
-    from tests.same.rewrites import merged
-
     return merged(inertial, Inertial(mass, Pose(at)))
 
 

@@ -23,8 +23,8 @@ from dynx.steppers.camera import Camera, DrawnShape, DrawnTriangles
 from dynx.viewer import Viewer
 from dynx.viewer.colours import RGB
 from dynx.viewer.export import stage_for
-from dynx.viewer.lettering import length_text
-from dynx.viewer.node_shapes import arrow
+from dynx.viewer.lettering import length_text, write_caption
+from dynx.viewer.node_shapes import arrow, node_shapes
 from dynx.world import Material, Scene, SceneRobot, World, box, ground, sphere
 from dynx.world.camera import BEHIND_OPACITY, cast_rays_smoothly, drawn_shapes
 from dynx.world.comparison import compare_engines
@@ -74,6 +74,23 @@ def test_a_picture_shows_marks_text_and_lines_of_the_page() -> None:
         assert np.array_equal(drawn(viewer), lined)
         viewer.text("here", (0.0, 0.0, 0.4))
         assert count(drawn(viewer), (255, 255, 255), 20) > count(lined, (255, 255, 255), 20) + 20
+
+
+def test_the_caption_says_what_marks_are_in_lines_that_fit() -> None:
+    with dynx.load(ROBOT).view() as viewer:
+        assert node_shapes(viewer.page, EYE).legends == ()
+        for kind in ("inertia ellipsoids", "inertia boxes", "centres of mass", "frames"):
+            viewer.set_shown(kind)
+        legends = node_shapes(viewer.page, EYE).legends
+    assert len(legends) == 4
+    assert any("inertia" in each for each in legends)
+    # In a narrow picture the caption has more lines; none reaches over the left edge.
+    grey = np.full((300, 400, 3), 128, dtype=np.uint8)
+    written = write_caption(grey, "; ".join(["tiles: 20 cm and 4 cm", *legends]))
+    changed = (written != grey).any(axis=2)
+    assert not changed[:, 0].any()
+    one_line = (write_caption(grey, "tiles: 20 cm") != grey).any(axis=(1, 2))
+    assert changed.any(axis=1).sum() > 1.8 * one_line.sum()
 
 
 def test_a_picture_hides_what_the_page_hides() -> None:
