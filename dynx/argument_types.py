@@ -123,7 +123,11 @@ def _wrong_type(function: Callable[..., Any], argument: str | int, value: object
     wanted = _written(parameters[name].annotation)
     for kind, maker in _MAKERS.items():
         if re.match(rf"{kind}\b", wanted):
-            wanted = f"a {wanted}, such as {maker}({shown(value) if isinstance(value, str) else '...'})"
+            example = f"{maker}({shown(value) if isinstance(value, str) else '...'})"
+            if kind == "Scene" and (type(value).__name__ == "Model" or str(value).endswith(".urdf")):
+                model = f"dynx.load({shown(value)})" if isinstance(value, str) else "model"
+                example = f"Scene('one robot', robots=(SceneRobot('robot', {model}),))"
+            wanted = f"a {wanted}, such as {example}"
     if isinstance(value, list | tuple) and value and all(map(_tests_of(function)[name], value)):
         wanted += "; one at a time"
     annotation = _Names(inspect.unwrap(function)).value_of(parameters[name].annotation)

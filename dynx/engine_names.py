@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from dynx import errors
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.errors import nearest, shown
 
@@ -373,6 +374,8 @@ def keyword_of_dynx(word: str, known: Iterable[str]) -> str | None:
 
 def call_of_dynx(name: str) -> str | None:
     """Return a clause with the call of dynx for the name that an engine has; None for another name."""
+    if name.endswith("Error") and hasattr(errors, name):
+        return f"; dynx has dynx.errors.{name}"
     spelling = _spelling(name)
     for known, call in SHORT.items():
         if _spelling(known) == spelling:

@@ -164,6 +164,7 @@ def test_a_name_written_with_underscores_is_the_same(name: str) -> None:
         ("compiled", "com", "Backend.center_of_mass(q)"),
         ("compiled", "fk", "Backend.forward_kinematics(q, frame)"),
         ("compiled", "ik", "Backend.inverse_kinematics(pose, frame)"),
+        ("dynx", "DynxError", "dynx.errors.DynxError"),
         ("dynx", "plant_model", "dynx.sim.plant_model(model, payload)"),
     ],
 )

@@ -57,6 +57,8 @@ def quat_from_rotation(R: ArrayLike) -> Floats:
 
 
 def _checked_rotation(R: ArrayLike) -> Floats:
+    if isinstance(R, np.ndarray) and R.shape[-2:] == (4, 4):
+        raise ShapeError(f"R has shape {R.shape}; wanted (..., 3, 3): of a pose T, T[..., :3, :3]")
     array = checked_array("R", R, 3)
     if array.ndim < 2 or array.shape[-2] != 3:
         raise ShapeError(f"R has shape {array.shape}; wanted (..., 3, 3)")

@@ -43,8 +43,12 @@ class Camera:
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "pose", checked_pose("pose of a camera", self.pose))
-        if not is_real(self.field_of_view) or not 0.0 < self.field_of_view < math.pi:
-            raise ArgumentError(f"field_of_view is {shown(self.field_of_view)}; wanted 0 to pi [rad]")
+        angle = self.field_of_view
+        if not is_real(angle):
+            raise ArgumentError(f"field_of_view is {shown(angle)}; wanted 0 to pi [rad]")
+        if not 0.0 < angle < math.pi:
+            meant = f"; {angle:g} degrees are {math.radians(angle):.4g}" if math.pi <= angle < 180.0 else ""
+            raise ArgumentError(f"field_of_view is {angle:g}; wanted 0 to pi [rad]{meant}")
         if not isinstance(self.size, tuple | list) or len(self.size) != 2:
             raise ArgumentError(f"size is {shown(self.size)}; wanted width and height")
         sides = tuple(whole_number(f"size[{k}]", side, 1) for k, side in enumerate(self.size))

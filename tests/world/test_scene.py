@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import dynx
-from dynx.errors import ArgumentError, UnknownNameError
+from dynx.errors import ArgumentError, DTypeError, UnknownNameError
 from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane
 from dynx.world import (
     Material,
@@ -16,6 +16,7 @@ from dynx.world import (
     SceneBody,
     SceneRobot,
     Weld,
+    World,
     box,
     capsule,
     cylinder,
@@ -49,6 +50,11 @@ def test_parts_are_found_by_name() -> None:
         scene().body("cubes")
     with pytest.raises(UnknownNameError, match="did you mean 'arm'"):
         scene().robot("arms")
+    link = scene().robot("arm").model.links[-1].name
+    with pytest.raises(UnknownNameError, match=f"did you mean 'arm/{link}'"):
+        scene().require(link)
+    with pytest.raises(DTypeError, match=r"SceneRobot\('robot', model\)"):
+        World(scene().robot("arm").model)  # type: ignore[arg-type]
 
 
 def test_materials_are_those_of_the_link_or_the_robot() -> None:

@@ -21,7 +21,7 @@ COMMANDS = {
     for name, target, line in (
         ("agree", "comparison:agree", "Compare the results of all engines on robots."),
         ("doctor", "comparison:doctor", "Find, prove and mend the causes of differences between engines."),
-        ("convert", "conversion:convert", "Write a robot as URDF or MJCF, with its meshes."),
+        ("convert", "conversion:convert", "Write a robot as URDF, MJCF or SDF, with its meshes."),
         ("same", "comparison:same", "Decide whether two files describe the same robot; mend one."),
         ("sim", "sim:sim", "Simulate a robot under a controller."),
         ("world", "motion:world", "Run a scene with contacts on several engines, and compare them."),

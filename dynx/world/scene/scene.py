@@ -239,7 +239,15 @@ class Scene:
             self._robots[owner].model.link(link)
         elif owner not in self._robots and (owner not in self._bodies or link is not None):
             known = [*self._robots, *self._bodies]
-            raise UnknownNameError(f"no part {shown(name)} in {self.name}{nearest(owner, known)}")
+            links = [
+                f"{robot.name}/{each.name}"
+                for robot in self.robots
+                for each in robot.model.links
+                if each.name == name
+            ]
+            raise UnknownNameError(
+                f"no part {shown(name)} in {self.name}{nearest(name, links) or nearest(owner, known)}"
+            )
 
     def _check_groups(self) -> None:
         _refuse_repeated([*self._robots, *self._bodies, *(name for name, _ in self.groups)])

@@ -154,7 +154,9 @@ def test_shapes_are_placed_in_their_body_and_colours_of_no_opacity_are_not_drawn
     ("options", "message"),
     [
         ({"field_of_view": 0.0}, "field_of_view"),
-        ({"field_of_view": 4.0}, "field_of_view"),
+        ({"field_of_view": 4.0}, "field_of_view is 4; wanted"),
+        ({"field_of_view": 90}, "90 degrees are 1.571"),
+        ({"field_of_view": "wide"}, "field_of_view is 'wide'"),
         ({"size": (0, 10)}, "size"),
         ({"size": (10_000, 10)}, "at most 8192"),
         ({"size": 10}, "wanted width and height"),
