@@ -57,9 +57,11 @@ def rules_at_two_places() -> tuple[str, ...]:
     """Name the rules whose trap beside itself has the cause at two places, of which each can be mended."""
     found = []
     for rule in all_rules():
-        # A second floating base is a joint of six degrees of freedom.
-        case = twin(trap_case(rule)) if rule.kind == "difference" and rule.id != "DX211" else None
-        if case is None or not rule.holds_for(_VERSIONS):
+        # A second floating base is a joint of six degrees of freedom; a twin is written in URDF.
+        if rule.kind != "difference" or rule.id == "DX211" or rule.formats[0] != "urdf":
+            continue
+        case = twin(trap_case(rule))
+        if not rule.holds_for(_VERSIONS):
             continue
         detected = rule.detect(case)
         if len({place_of(rule, each) for each in detected}) < 2:

@@ -94,16 +94,3 @@ def test_a_damaged_trap_is_examined_or_refused(data: st.DataObject) -> None:
                 start, end = data.draw(st.sampled_from(spans))
                 content[first:last] = content[start:end]
     require_end(bytes(content))
-
-
-@pytest.mark.parametrize(
-    ("text", "name"),
-    [
-        ('<mujoco><worldbody><body name="b"/></worldbody></mujoco>', "MJCF"),
-        ('<sdf version="1.9"><model name="m"><link name="l"/></model></sdf>', "SDF"),
-    ],
-)
-def test_formats_that_are_not_examined_are_named(text: str, name: str) -> None:
-    report = diagnose(text)
-    assert report.error is not None
-    assert f"this is {name}" in report.error.message

@@ -11,6 +11,7 @@ import pytest
 
 import dynx
 from dynx.errors import ArgumentError
+from dynx.spatial.scalar import Floats
 from dynx.viewer import Viewer
 from dynx.viewer.drawn_robot import MIN_COPIES
 from tests.viewer.conftest import OpenPage, connected, pixel_of, until
@@ -87,6 +88,17 @@ def greens(viewer: Viewer) -> Any:
     return picture[..., 1] > picture[..., [0, 2]].max(axis=2) + 30
 
 
+def hovers(page: Any, client: Any, point: Floats, part: str) -> bool:
+    """Move the pointer to a point (3,) in the world and check whether the page says that it is over a part:
+    it says so only while the pointer moves, once all is drawn."""
+    x, y = pixel_of(client, point)
+    page.mouse.move(x - 1, y)
+    page.mouse.move(x, y)
+    page.wait_for_timeout(200.0)
+    shown = page.evaluate("document.getElementById('dynx-hovered')?.textContent")
+    return bool(shown == part)
+
+
 def test_copies_are_clicked_hidden_seen_through_and_followed_one_by_one(open_page: OpenPage) -> None:
     model = dynx.load(ROBOT)
     q = np.zeros((9, 1))
@@ -98,13 +110,8 @@ def test_copies_are_clicked_hidden_seen_through_and_followed_one_by_one(open_pag
         until(lambda: greens(viewer).sum() > 1000, "the boxes")
         for number in (0, 5):
             top = viewer.view.drawn.pose(f"r {number}/base")[:3, 3] + [0.0, 0.0, 0.15]
-            x, y = pixel_of(client, top)
-            opened.page.mouse.move(x - 1, y)
-            opened.page.mouse.move(x, y)
-            opened.page.wait_for_function(
-                f"document.getElementById('dynx-hovered')?.textContent === 'r {number}/base'"
-            )
-            opened.page.mouse.click(x, y)
+            until(partial(hovers, opened.page, client, top, f"r {number}/base"), "the part under the pointer")
+            opened.page.mouse.click(*pixel_of(client, top))
             until(partial(clicked.__contains__, f"r {number}/base"), "the click")
         assert clicked == ["r 0/base", "r 5/base"]
         assert viewer.view.names.shown == "r 5/base"

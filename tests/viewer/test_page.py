@@ -177,12 +177,18 @@ def test_held_keys_the_pointer_and_choices_reach_the_program(open_page: OpenPage
             page.page.wait_for_timeout(200.0)
             return [each for each in told if isinstance(each, tuple) and each[0] == "cube"]
 
-        until(seen, "the part under the pointer")
-        _, origin, direction = seen()[-1]
-        assert np.allclose(origin, client.camera.position, atol=1e-3)
-        towards = target - client.camera.position
-        assert direction @ towards / np.linalg.norm(towards) > 0.999
-        assert np.linalg.norm(direction) == pytest.approx(1.0)
+        def is_aimed_at() -> bool:
+            """Check the last ray; on a busy machine the page may still be on its way to this view."""
+            rays = seen()
+            towards = target - client.camera.position
+            return bool(
+                rays
+                and np.allclose(rays[-1][1], client.camera.position, atol=1e-3)
+                and rays[-1][2] @ towards / np.linalg.norm(towards) > 0.999
+            )
+
+        until(is_aimed_at, "the ray to the part under the pointer")
+        assert np.linalg.norm(seen()[-1][2]) == pytest.approx(1.0)
 
         text.remove()
         until(lambda: written.count() == 0, "the text to go")

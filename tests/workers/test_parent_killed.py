@@ -114,10 +114,15 @@ ENDLESS = (
 )
 """A file whose expansion counts for hours, in one call that holds the interpreter's lock."""
 
+BODY = '<body pos="0 0 0.1"><joint damping="0.1" armature="0.01"/><geom size="0.05"/>'
+CHAIN = f"<mujoco><worldbody>{BODY * 12}{'</body>' * 12}</worldbody></mujoco>"
+"""A robot in MJCF whose importers drop something of each joint, so that the doctor is busy for a while."""
+
 COMMANDS: dict[str, list[str]] = {
     "doctor": ["doctor", "ur5", "--jobs", "1"],
     "agree": ["agree", "ur5", "--jobs", "1"],
     "contacts": ["contacts", "--jobs", "1"],
+    "importers": ["doctor", "chain.xml", "--jobs", "1"],
     "xacro": ["id", "endless.xacro"],
 }
 """A command for each module that starts processes."""
@@ -139,6 +144,7 @@ def test_no_other_module_starts_processes() -> None:
         "dynx/workers.py",
         "dynx/cli/shell/run.py",  # doctor and agree
         "dynx/contacts/run.py",
+        "dynx/doctor/examination.py",  # engines that read MJCF or SDF by themselves
         "dynx/model/xacro_reading.py",
     }
 
@@ -150,6 +156,7 @@ def test_no_process_outlives_a_killed_command(name: str, number: signal.Signals,
     if name == "xacro":
         pytest.importorskip("xacro")
     (tmp_path / "endless.xacro").write_text(ENDLESS, encoding="utf-8")
+    (tmp_path / "chain.xml").write_text(CHAIN, encoding="utf-8")
     line = [sys.executable, "-P", "-m", "dynx", *COMMANDS[name]]
     quiet = subprocess.DEVNULL
     command = subprocess.Popen(

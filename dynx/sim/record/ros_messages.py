@@ -36,9 +36,9 @@ of their header is the time at which they were taken, and its frame is called li
 
 | topic | type | content |
 |---|---|---|
-| `/sensors/NAME` | sensor_msgs/Imu | of an IMU; covariances of the white noise |
-| `/sensors/NAME` | geometry_msgs/WrenchStamped | force and torque; of contacts without torque |
-| `/sensors/NAME` | sensor_msgs/JointState | of an encoder; of a joint torque, as effort |
+| `/sensors/NAME` | sensor_msgs/Imu | the sample of an IMU, with the covariances of its white noise |
+| `/sensors/NAME` | geometry_msgs/WrenchStamped | force and torque; of a contact sensor the force alone |
+| `/sensors/NAME` | sensor_msgs/JointState | the angle of an encoder; of a joint torque the effort |
 | `/sensors/NAME` | std_msgs/Float64 | distance of a ray |
 
 Every number is the float64 of the record. The torque of a step is stamped with the time at which the step

@@ -138,7 +138,7 @@ def test_a_mimic_joint_is_a_constraint_that_forward_dynamics_refuses() -> None:
     with loaded(LoadedDrake, model, text) as robot:
         assert_alike(robot, model, solve=False)
         remarks = robot.describe().remarks
-        if "1 mimic joints are constraints" in remarks:
+        if "1 couplings of joints are constraints" in remarks:
             with pytest.raises(EngineError, match="does not support constraints"):
                 robot.forward_dynamics(q, v, a)
         else:
