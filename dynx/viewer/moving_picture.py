@@ -47,6 +47,19 @@ COARSE_WHILE_MOVING = (
   };
   let waiting = false, quiet = 0, view = null;
   const stateOfPicture = () => window.__viserMutable?.scene?.__r3f?.root?.getState?.();
+  // Programs are told the size of the whole picture, also while it has fewer pixels.
+  const tellWholeSize = (page) => {
+    let send = page.sendMessage;
+    const sendSized = (message) => {
+      if (message.type !== "ViewerCameraMessage") return send(message);
+      const {clientWidth, clientHeight} = page.canvas;
+      return send({...message, image_width: clientWidth, image_height: clientHeight});
+    };
+    Object.defineProperty(page, "sendMessage", {
+      get: () => send && sendSized,
+      set: (given) => { send = given; },
+    });
+  };
   let setRatio = null;
   const setResolution = (ratio) => {
     const state = stateOfPicture();
@@ -55,6 +68,7 @@ COARSE_WHILE_MOVING = (
     if (!setRatio) {
       setRatio = state.setDpr;
       window.__viserMutable.scene.__r3f.root.setState({setDpr: () => {}});
+      tellWholeSize(window.__viserMutable);
     }
     if (state.viewport.dpr === ratio) return;
     setRatio(ratio);

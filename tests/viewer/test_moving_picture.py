@@ -46,7 +46,9 @@ def sharp(picture: Any) -> float:
 def test_a_page_has_fewer_pixels_while_a_part_or_its_camera_moves(open_page: OpenPage) -> None:
     with dynx.load(LIFT).view(whole_meshes=False) as viewer:
         page = open_page(viewer.url)
-        connected(viewer)
+        (client,) = connected(viewer)
+        box = page.page.locator("canvas[data-engine]").bounding_box()
+        size = (box["width"], box["height"])
 
         def ratio() -> float:
             return float(page.page.evaluate(SIZES))
@@ -66,7 +68,10 @@ def test_a_page_has_fewer_pixels_while_a_part_or_its_camera_moves(open_page: Ope
 
         until(turns, "fewer pixels while the camera moves")
         page.page.mouse.up()
+        # Programs place things in the picture by its size, which stays that of the whole one.
+        assert (client.camera.image_width, client.camera.image_height) == size
         until(lambda: abs(ratio() - 1.0) < 0.01, "all pixels when the camera rests")
+        assert (client.camera.image_width, client.camera.image_height) == size
         assert not page.errors
 
 
