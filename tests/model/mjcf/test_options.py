@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,6 +14,8 @@ import dynx
 from dynx.errors import DescriptionError
 from dynx.model.mjcf.options import FLAGS
 from dynx.world import Scene, read_scene
+
+mujoco = pytest.importorskip("mujoco")
 
 OLDER = {"passive", "sensornoise"}
 """Flags that MuJoCo 4.0 has no longer."""
