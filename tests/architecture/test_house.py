@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from itertools import pairwise
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 PROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+
+
+TOP_LEVEL = {"benchmarks", "docs", "dynx", "models", "tests"} | {
+    "CHANGELOG.md",
+    "CITATION.cff",
+    "LICENSE",
+    "README.md",
+    "action.yml",
+    "pyproject.toml",
+}
 
 
 def rooms() -> set[str]:
@@ -22,6 +35,15 @@ def layers(text: str) -> list[list[str]]:
     block = re.search(r'type = "layers"\nlayers = \[\n(.*?)^\]', text, flags=re.MULTILINE | re.DOTALL)
     assert block
     return [re.findall(r"dynx\.(\w+)", line) for line in block.group(1).splitlines()]
+
+
+def test_nothing_else_lies_at_top_level() -> None:
+    """What an example or a test left in the folder has been committed before."""
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listed.returncode != 0:
+        pytest.skip("not a clone")
+    tracked = {path.partition("/")[0] for path in listed.stdout.splitlines()}
+    assert {name for name in tracked if not name.startswith(".")} == TOP_LEVEL
 
 
 def test_every_room_has_a_line() -> None:

@@ -426,7 +426,12 @@ def test_a_motion_plays_in_a_notebook_without_a_server(open_page: OpenPage, tmp_
     (tmp_path / "host.html").write_text(f"<!doctype html><title>host</title>{host}", encoding="utf-8")
     page = open_page()
     page.page.goto((tmp_path / "host.html").as_uri())
-    until(lambda: len(page.page.frames) == 3, "the frame in the frame")
+
+    def has_frames() -> bool:
+        page.page.wait_for_timeout(50)  # Playwright learns of a frame only while one of its calls runs
+        return len(page.page.frames) == 3
+
+    until(has_frames, "the frame in the frame")
     inner = page.page.frames[2]
     inner.wait_for_selector("canvas[data-engine]")
     node = "Object.values(__viserMutable.nodePoseData).map(each => each.wxyz.join()).join()"
