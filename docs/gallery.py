@@ -134,7 +134,7 @@ def r2d2(path: str) -> None:
         viewer.export(path, size=SIZE, direction=(0.75, -1.0, 0.4))
 
 
-@picture("Contacts", "The forces on the feet of a quadruped that stands: together they carry its weight.")
+@picture("Contacts", "Contact forces on the feet of a standing quadruped. Their sum is its weight.")
 def contacts(path: str) -> None:
     with World(read_scene("standing"), "mujoco") as world:
         world.step(1500)
@@ -143,7 +143,10 @@ def contacts(path: str) -> None:
             viewer.export(path, size=SIZE)
 
 
-@picture("Inertia ellipsoids", "For each link the ellipsoid of uniform density with its mass and inertia.")
+@picture(
+    "Inertia ellipsoids",
+    "For each link, the ellipsoid of uniform density that has the link's mass and inertia.",
+)
 def inertia_ellipsoids(path: str) -> None:
     model = dynx.load("solo12", base="floating")
     q = np.concatenate([model.neutral()[:7], np.tile([0.0, 0.7, -1.4], 4)])
@@ -152,7 +155,7 @@ def inertia_ellipsoids(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("Frames", "The frames of the links, x red, y green and z blue, in a Panda that is seen through.")
+@picture("Frames", "The frames of the links in a see-through Panda: x is red, y green and z blue.")
 def frames(path: str) -> None:
     with dynx.load("panda").view(q=[0, -0.5, 0, -2.1, 0, 1.6, 0.8, 0.02], whole_meshes=True) as viewer:
         viewer.set_shown("frames")
@@ -160,7 +163,9 @@ def frames(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("Two engines", "A ball hits pins: in PyBullet solid, in MuJoCo see-through and blue.", ".webp")
+@picture(
+    "Two engines", "A ball hits pins: PyBullet's result is solid, MuJoCo's is see-through and blue.", ".webp"
+)
 def two_engines(path: str) -> None:
     run = compare_engines(read_scene("bowling"), ["pybullet", "mujoco"], duration=1.2, samples=60)
     with Viewer(run, port=0) as viewer:
@@ -169,7 +174,7 @@ def two_engines(path: str) -> None:
 
 @picture(
     "Gravity torques",
-    "Arrows along the joint axes: their length is the torque over its limit, the number the torque.",
+    "Arrows along the joint axes: the length is the torque over its limit; the number is the torque.",
 )
 def gravity_torques(path: str) -> None:
     with dynx.load("panda").view(q=[0, 0.5, 0, -1.6, 0, 2.1, 0.8, 0.02], whole_meshes=True) as viewer:
@@ -177,21 +182,23 @@ def gravity_torques(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("Manipulability", "The ellipsoid of the velocities that unit joint speeds give the flange.")
+@picture("Manipulability", "Velocities of the flange for all joint velocities of norm 1: an ellipsoid.")
 def manipulability(path: str) -> None:
     with dynx.load("ur5").view(q=[0.6, -0.9, 1.2, -1.8, -1.57, 0.3], whole_meshes=True) as viewer:
         viewer.set_shown("manipulability")
         viewer.export(path, size=SIZE)
 
 
-@picture("Collision shapes", "The hulls by which engines collide a Panda, over its visual shapes.")
+@picture(
+    "Collision shapes", "The convex hulls that engines use for collisions of a Panda, over its visual shapes."
+)
 def collision_shapes(path: str) -> None:
     with dynx.load("panda").view(q=[0, -0.5, 0, -2.1, 0, 1.6, 0.8, 0.02], whole_meshes=True) as viewer:
         viewer.set_shown("collision shapes")
         viewer.export(path, size=SIZE)
 
 
-@picture("Names", "Names of links; those without room are left out.")
+@picture("Names", "Names of links. Names without room are left out.")
 def names(path: str) -> None:
     with dynx.load("allegro_right_hand").view(whole_meshes=True) as viewer:
         viewer.set_shown("names")
@@ -236,7 +243,7 @@ def many_robots(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("A duck", "A mesh with its image. For contacts its convex hull counts.")
+@picture("A duck", "A mesh with an image. Contacts use the convex hull of the mesh.")
 def duck(path: str) -> None:
     with World(read_scene("duck"), "mujoco") as world:
         world.step(300)
@@ -245,7 +252,7 @@ def duck(path: str) -> None:
             viewer.export(path, size=SIZE)
 
 
-@picture("Mobile robot", "TIAGo, beside a text that the program writes.")
+@picture("Mobile robot", "TIAGo, and a text that the program writes.")
 def mobile_robot(path: str) -> None:
     with dynx.load("tiago").view(whole_meshes=True) as viewer:
         viewer.text("TIAGo", (0.35, 0.4, 0.9), colour="blue", size=26)
@@ -254,11 +261,12 @@ def mobile_robot(path: str) -> None:
 
 HEAD = """# Gallery
 
-Each picture or film on this page stands above the program that draws it. The viewer of dynx draws them,
-without a browser and without a graphics processor. The programs need the extras `viewer`, `world`, `film`,
-`mujoco` and `drake`. A program takes up to two minutes; `python -m docs.gallery` runs them all.
+The program below each picture or film draws it. The viewer of dynx needs no browser and no graphics processor
+for this. The programs need the extras `viewer`, `world`, `film`, `mujoco` and `drake`. A program takes up to
+two minutes; `python -m docs.gallery` runs all programs.
 
-One environment that dynx plays is not here: Gymnasium's own lander (extra `box2d`) draws its own pictures.
+dynx also plays Gymnasium's own lander (extra `box2d`). This environment draws its own pictures, so it is not
+on this page.
 """
 
 
