@@ -28,6 +28,7 @@ _SHAPES = "dynx.world.box, sphere, cylinder, capsule or mesh, in Scene(bodies=..
 _CONSTRAINT = "dynx.world.PointToPoint or Weld, in Scene(constraints=...)"
 _FORCE = "dynx.ExternalForce(part, wrench), in World.step(forces=[...])"
 _CAMERA = "World.camera(dynx.world.Camera(...))"
+_WHOLE_STEP = "World.step(torques={robot: tau}), which does mj_step1 and mj_step2 together"
 _FILES = "dynx.load(path) for a robot in URDF or xacro, and dynx.world.read_scene(path) for a scene"
 _SAVE = "World.save(), or World.write(path) for a file"
 _VIEW = "World.view(), a page in the browser"
@@ -160,8 +161,8 @@ MUJOCO = {
     "mj_rne": "Backend.inverse_dynamics(q, v, a)",
     "mj_saveLastXML": "World.to_mjcf() or Model.to_mjcf()",
     "mj_step": "World.step()",
-    "mj_step1": "World.step()",
-    "mj_step2": "World.step()",
+    "mj_step1": _WHOLE_STEP,
+    "mj_step2": _WHOLE_STEP,
 }
 """Functions and classes of MuJoCo, besides those of quantities."""
 
