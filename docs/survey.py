@@ -72,14 +72,15 @@ def page(entries: Sequence[Entry]) -> str:
     lines = [
         "# Real robots: why engines differ on them",
         "",
-        "Written by `python -m docs.survey`. Every file is loaded by each engine as its users load it, fixed "
-        "and floating, and compared with reference values; see [doctor](doctor.md). The effect of a cause "
-        "is how much an engine's result changes when that cause alone is removed, relative to the "
-        "largest reference value; `no answer` means that the engine refuses the file, or cannot compute the "
-        "quantity, until it is removed; `present` means forces of contacts, which have no number. "
-        "Every cause listed is proved. Rules are explained in [rules](rules.md).",
+        "Written by `python -m docs.survey`. Each engine loads every file by the call that its users use, "
+        "with a fixed and with a floating base. dynx compares the results with reference values; see "
+        "[doctor](doctor.md). The tables list only proved causes. The effect of a cause is the change of an "
+        "engine's result when dynx removes only this cause, relative to the largest reference value. "
+        "`no answer` means that the engine refuses the file, or cannot compute the quantity, until the cause "
+        "is removed. `present` means contact forces, which have no number. [Rules](rules.md) explains the "
+        "rules.",
         "",
-        "Figures on public files that the doctor was not developed with: [public files](public_files.md).",
+        "[Public files](public_files.md) has figures on files that were not used to develop the doctor.",
         "",
     ]
     for group, title in GROUPS.items():
@@ -95,7 +96,8 @@ def page(entries: Sequence[Entry]) -> str:
         lines += merged([row for entry in of for row in rows(entry)])
         left = [f"- {label(entry)}, {entry['base']}: {line}" for entry in of for line in exceptions(entry)]
         if left:
-            lines += ["", "Not examined, or not loaded by an engine after mending either:", "", *left]
+            unread = "Files that dynx did not examine, or that an engine does not load even after the repair:"
+            lines += ["", unread, "", *left]
         lines.append("")
     return "\n".join(lines)
 

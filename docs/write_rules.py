@@ -19,10 +19,11 @@ HEAD = """<!-- Written by docs/write_rules.py from the classes in dynx/rules/cat
 
 # Why engines differ on a file
 
-All causes that `dynx doctor` detects. With a cause of kind *difference*, engines give different numbers or
-one refuses the file; a cause of kind *practice* is bad practice or concerns a single engine, without a
-difference that can be measured. The versions of engines are those in which the behaviour was measured; a test
-checks each against the installed engines. Each rule has a small robot in `models/traps` that shows its cause.
+This page lists all causes that `dynx doctor` detects. There are two kinds. A *difference* makes engines
+return different numbers, or makes an engine refuse the file. A *practice* is bad practice or concerns one
+engine, without a measurable difference. Each rule states the engine versions in which the behaviour was
+measured; a test checks them against the installed engines. Each rule has a small robot in `models/traps` that
+shows its cause.
 """
 
 GROUPS = {
