@@ -1,4 +1,4 @@
-"""Distance of two convex shapes between bounds that anyone can check."""
+"""Distance of two convex shapes, with a lower and an upper bound that a user can check."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 class Distance:
     """Signed distance of two shapes between two bounds: negative where they overlap.
 
-    The distance of overlapping shapes is minus the depth, the length of the shortest translation after which
-    their interiors are disjoint. `lower` is in every case the separation of the shapes along `normal`
-    (`separation`), from the support functions alone. `upper` of separated shapes is the distance of the two
-    points; of overlapping ones it is minus the radius of a ball in their difference, or `lower` again where
-    the depth is known in closed form.
+    The distance of overlapping shapes is minus the depth: the length of the shortest translation that makes
+    their interiors disjoint. `lower` is always the separation of the shapes along `normal` (`separation`),
+    computed from the support functions alone. For separated shapes `upper` is the distance of the two points.
+    For overlapping shapes `upper` is minus the radius of a ball inside their difference, or equals `lower` if
+    the depth has a closed form.
     """
 
     lower: float
@@ -41,11 +41,11 @@ class Distance:
     point_b: Floats
     """Point (3,) of b [m]; `point_a - point_b` is the distance times the normal."""
     normal: Floats
-    """Unit vector (3,) from b to a, along which a leaves b by the shortest way where they overlap."""
+    """Unit vector (3,) from b to a. For overlapping shapes, a leaves b by the shortest way along it."""
 
     @property
     def distance(self) -> float:
-        """The bound that the points attain: the upper one if separated, otherwise the lower one."""
+        """Signed distance [m]: `upper` for separated shapes, `lower` for overlapping shapes."""
         return self.upper if self.upper > 0.0 else self.lower
 
     @property
@@ -63,8 +63,8 @@ def distance(
 ) -> Distance:
     """Return the signed distance of two convex shapes at poses (a `Pose` or a matrix (4, 4)).
 
-    A mesh stands for its convex hull, a plane for its half-space. Raises ArgumentError for two planes and for
-    anything that is no convex shape, the errors of `Mesh.hull`, and those of invalid poses.
+    For a mesh dynx uses the convex hull, for a plane the half-space. Raises ArgumentError for two planes and
+    for objects that are not convex shapes, the errors of `Mesh.hull`, and the errors of invalid poses.
     """
     poses = _checked_pose("T_a", T_a), _checked_pose("T_b", T_b)
     found = distance_of_cores(_core_of(shape_a, "shape_a"), poses[0], _core_of(shape_b, "shape_b"), poses[1])

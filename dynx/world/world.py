@@ -162,15 +162,17 @@ class World:
     """The robots and bodies of a scene in motion, with contacts, in steps of `dt` [s].
 
     Each step consists of `substeps` steps of the engine. `joint_limits`, `joint_damping`, `joint_friction`
-    and `joint_armature` are those of the robots' descriptions; joint dynamics that the engine does not have
-    are computed outside of it. Without `collisions` nothing touches. `settings` are those of the engine
-    (`World.settings`), which the page "Scenes and worlds" of the documentation lists. With `keep_last_step`
-    the state before each step of the engine is kept, from which `joint_wrenches` and `base_wrench` follow, as
-    it is for a scene with sensors; with `contact_interval` [s] the contacts of each step of the engine are
-    summed, of which `mean_contacts` gives the mean over that time. A step then takes longer.
+    and `joint_armature` switch these properties of the robot descriptions on or off. If the engine does not
+    have a part of the joint dynamics, dynx computes it. Without `collisions` there are no contacts.
+    `settings` are settings of the engine (`World.settings`); the reference of worlds lists them.
 
-    A world is closed by `close` or at the end of a ``with`` block. Arguments are checked before the engine
-    gets them, and a call that raises an error leaves the state as it was.
+    With `keep_last_step`, or for a scene with sensors, the world keeps the state before each step of the
+    engine. `joint_wrenches` and `base_wrench` need this state. With `contact_interval` [s] the world sums the
+    contacts of each step of the engine, and `mean_contacts` returns their mean over that time. With either
+    option a step takes longer.
+
+    Close a world by `close` or by a ``with`` block. dynx checks arguments before it calls the engine. A call
+    that raises an error leaves the state unchanged.
     """
 
     def __init__(
@@ -495,7 +497,7 @@ class World:
         self._motion.change(lambda engine: apply_state(engine, checked), clock)
 
     def reset(self) -> None:
-        """Return to the start of the scene, at time 0, as a new world is."""
+        """Return to the initial state of the scene, at time 0."""
         self._forget_steps()
         self._motion.reset()
 
@@ -674,7 +676,7 @@ class World:
     def avoidance(
         self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None
     ) -> Avoidance:
-        """Return what a robot keeps away from, where everything is now (`Scene.avoidance`)."""
+        """Return the obstacles of a robot at the present state, with their margins (`Scene.avoidance`)."""
         return scene_at(self.scene, self.state).avoidance(robot, margin=margin, self_margin=self_margin)
 
     @checks_types

@@ -111,21 +111,21 @@ class SensorMotion:
 
 @dataclass(frozen=True, eq=False)
 class Tool:
-    """Everything that a force-torque sensor carries, and the sensor's bias."""
+    """Tool that a force-torque sensor carries, and the bias of the sensor."""
 
     mass: float
     """Mass [kg]."""
     center: Floats
     """Centre of mass (3,) in the sensor's frame [m]."""
     inertia: Floats | None
-    """Inertia (3, 3) about the centre of mass, in the sensor's axes [kg m^2]; None, counted as zero, if it
-    was not identified."""
+    """Inertia (3, 3) about the centre of mass, in the sensor's axes [kg m^2]. None if it was not identified;
+    `wrench` and `payload` then use zero."""
     bias: Floats
     """Force [N] and torque [N m] (6,) that the sensor reads without any load."""
     condition: float
-    """Condition number of the scaled equations: the factor by which errors of readings may be amplified."""
+    """Condition number of the scaled equations: errors of readings may grow by this factor."""
     residual: float
-    """Root mean square of what the readings differ from their fit [N, N m]."""
+    """Root mean square of the differences between readings and fit [N, N m]."""
 
     @checks_types
     def wrench(self, motion: SensorMotion) -> Floats:
@@ -157,12 +157,13 @@ def identify_tool(
 ) -> Tool:
     """Return the tool and the bias that explain readings (n, 6) best: force [N], then torque [N m].
 
-    Nothing may touch the tool meanwhile. At rest, three orientations show mass, centre and bias, if gravity
-    has three directions in the sensor's axes that do not lie on a line. `bias=False` takes the bias as zero.
-    `inertia` says whether the tensor is identified, by default if the sensor turns.
+    During the readings nothing may touch the tool. At rest, three orientations determine mass, centre and
+    bias, if the three vectors of gravity in the sensor's axes have tips that are not on one line.
+    `bias=False` assumes a bias of zero. With `inertia` the tensor is identified, too; the default is True if
+    the sensor rotates.
 
-    Raises ArgumentError for readings that do not determine the tool, which names what they lack, and for a
-    mass that is not positive: readings of the opposite sign.
+    Raises ArgumentError for readings that do not determine the tool (the error names the missing parameters),
+    and for a mass that is not positive (the readings have the opposite sign).
     """
     rows = _checked_readings(readings, motion)
     tensor = not motion.rests if inertia is None else inertia

@@ -25,28 +25,29 @@ of the torques of 0.1 % would already be as large as the estimate there."""
 class WrenchEstimate:
     """Wrenches that explain external torques best, in the least-squares sense; leading axes are batch.
 
-    Of m numbers, the six of each frame (or three forces), the torques J' w show `rank`, and are blind to the
-    rest. What they show of a true wrench w is ``observable @ w``, and `wrench` estimates that. Forces and
-    moments count alike, as numbers in N and N m.
+    A wrench w has m components: six for each frame (or three forces). The torques J' w determine `rank`
+    directions of w, and no component in the other directions. ``observable @ w`` is the part of a true wrench
+    w that the torques determine, and `wrench` estimates this part. Forces and moments have equal weights, as
+    numbers in N and N m.
     """
 
     frames: tuple[str, ...]
     wrench: Floats
     """Force [N], then moment [N m] (..., 6); of several frames (..., n, 6)."""
     rank: Any
-    """Number of directions that the torques show (...,), of m."""
+    """Number of directions (...,) that the torques determine, at most m."""
     observable: Floats
-    """Orthogonal projection (..., m, m) onto the directions that the torques show."""
+    """Orthogonal projection (..., m, m) onto the directions that the torques determine."""
     condition: Floats
-    """Largest divided by smallest singular value (...,) of the directions that are shown, the factor by which
-    errors of the torques may be amplified; infinite where nothing is shown."""
+    """Largest divided by smallest singular value (...,) of the determined directions. Relative errors of the
+    torques may grow by this factor in the wrench. Infinite if the torques determine no direction."""
     unexplained: Floats
-    """External torque (..., nv) that no wrench on the frames explains; large where another link is touched,
-    or the model is wrong."""
+    """External torque (..., nv) that no wrench on the frames explains. It is large if a force acts on another
+    link, or if the model is wrong."""
 
     @property
     def blind(self) -> tuple[str, ...]:
-        """Directions that the torques do not show, of a single sample, each as a sum of components."""
+        """Directions that the torques do not determine, for a single sample, each as a sum of components."""
         if self.observable.ndim != 2:
             raise ArgumentError(
                 f"the estimate is of a batch {self.observable.shape[:-2]}; wanted that of one sample"
