@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from dynx.model.elements import (
+    Actuator,
     Frame,
     Inertial,
     Joint,
@@ -18,6 +19,7 @@ from dynx.model.model import Model
 from dynx.registry import moved_names
 
 __all__ = [
+    "Actuator",
     "Frame",
     "Inertial",
     "Joint",

@@ -204,6 +204,10 @@ def robot_differences(model: Model, back: Model) -> Iterator[str]:
             found = _inertial_difference(link.inertial or Inertial(), links[link.name].inertial or Inertial())
             if found:
                 yield f"the {found} of link {shown(link.name)} differs"
+    if model.actuators is not None and back.actuators is not None:
+        moving = {joint.name for joint in model.joints if joint.moves}
+        if back.actuators != tuple(each for each in model.actuators if each.joint in moving):
+            yield "the actuators differ"
     joints = {joint.name: joint for joint in back.joints}
     yield from _missing("joint", [joint.name for joint in model.joints], [*joints])
     for joint in model.joints:

@@ -279,6 +279,25 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Actuator:
+    """What drives a joint, as a description states it. It is data: no robot that dynx moves has actuators.
+
+    Of the command u and of the position q and velocity v of the joint follow the force
+    ``f = gain u + bias[0] + bias[1] gear q + bias[2] gear v`` and the effort ``gear f`` [N m or N], as in
+    MuJoCo. u is kept within `control_range`, f within `force_range`. `name` may be empty.
+    """
+
+    name: str
+    joint: str
+    gear: float = 1.0
+    gain: float = 1.0
+    bias: Vector = ZERO
+    control_range: tuple[float, float] = (-INFINITY, INFINITY)
+    force_range: tuple[float, float] = (-INFINITY, INFINITY)
+    line: int | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
 class Frame:
     """A named frame fixed to a link; every link has one with its own name at the identity."""
 

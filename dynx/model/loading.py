@@ -222,6 +222,8 @@ def build_described(
             notes=content.notes,
             source=source,
             geometry=content.geometry,
+            actuators=content.actuators,
+            contact_filter=content.contact_filter,
         )
     except DescriptionError as error:
         if content.unread is None:

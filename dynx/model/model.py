@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.model import configuration, topology
-from dynx.model.elements import IDENTITY, Frame, Joint, Link, Note, Pose, checked_pose
-from dynx.model.geometry.links import Geometry
+from dynx.model.elements import IDENTITY, Actuator, Frame, Joint, Link, Note, Pose, checked_pose
+from dynx.model.geometry.links import ContactFilter, Geometry
 from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.model.numbers import checked_gravity
 from dynx.model.topology import refuse_unbounded_numbers
@@ -34,8 +34,9 @@ class Model(Tree):
     and ``v[:3]``, ``v[3:6]`` its linear [m/s] and angular [rad/s] velocity, both expressed in the base frame.
     A fixed base has the pose `base_pose` in the world.
 
-    `geometry` holds the visual and collision shapes of the links. It affects no dynamics without contacts, so
-    models that differ in it alone are equal.
+    `geometry` holds the visual and collision shapes of the links, `contact_filter` which of them may touch,
+    `actuators` what drives the joints. They affect no dynamics without contacts and commands, so models that
+    differ in them alone are equal.
 
     Models are immutable; they compare by content (`==`), hash and pickle.
     """
@@ -55,6 +56,8 @@ class Model(Tree):
         notes: Iterable[Note] = (),
         source: str = "<memory>",
         geometry: Geometry = NO_GEOMETRY,
+        actuators: Iterable[Actuator] | None = None,
+        contact_filter: ContactFilter | None = None,
     ) -> Model:
         """Check that links and joints form one tree, order them, lock joints, and create the model.
 
@@ -77,6 +80,8 @@ class Model(Tree):
             notes=tuple(notes),
             source=source,
             geometry=geometry.for_links(link.name for link in ordered_links),
+            actuators=None if actuators is None else tuple(actuators),
+            contact_filter=contact_filter,
         )
 
     # -- configuration arithmetic ------------------------------------------------------------

@@ -11,8 +11,8 @@ import numpy as np
 
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, Link, Note, Pose, Vector
-from dynx.model.geometry.links import Geometry
+from dynx.model.elements import IDENTITY, Actuator, Frame, Inertial, Joint, Link, Note, Pose, Vector
+from dynx.model.geometry.links import ContactFilter, Geometry
 from dynx.spatial.scalar import Floats
 
 Base = Literal["fixed", "floating"]
@@ -39,6 +39,10 @@ class Tree:
     notes: tuple[Note, ...] = field(default=(), compare=False)
     source: str = field(default="<memory>", compare=False)
     geometry: Geometry = field(default=NO_GEOMETRY, compare=False)
+    actuators: tuple[Actuator, ...] | None = field(default=None, compare=False)
+    """What drives the joints; None where the description leaves it open."""
+    contact_filter: ContactFilter | None = field(default=None, compare=False)
+    """Which shapes may touch; None where the description leaves it open."""
 
     def __post_init__(self) -> None:
         if self.floating and self.base_pose != IDENTITY:
@@ -222,6 +226,8 @@ class Description:
     """The base that the file states; None for a format that leaves it open."""
     gravity: Vector = STANDARD_GRAVITY
     base_pose: Pose = IDENTITY
+    actuators: tuple[Actuator, ...] | None = None
+    contact_filter: ContactFilter | None = None
 
 
 def checked_base(base: str) -> Literal["fixed", "floating"]:

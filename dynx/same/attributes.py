@@ -13,7 +13,7 @@ import numpy as np
 from dynx.errors import DescriptionError
 from dynx.model import Model
 from dynx.model.elements import Joint
-from dynx.model.geometry.links import Collision, Visual
+from dynx.model.geometry.links import Collision, ShapeNumber, Visual
 from dynx.model.geometry.mesh import Mesh
 from dynx.model.mechanism import ROOT
 from dynx.model.numbers import is_real
@@ -36,6 +36,8 @@ Kind = Literal[
     "armature",
     "collision shapes",
     "visual shapes",
+    "contact filter",
+    "actuator",
     "frame",
     "name",
     "gravity",
@@ -54,7 +56,7 @@ class Attribute:
     """A difference beside the verdict, with the values in both descriptions and their lines."""
 
     kind: Kind
-    tag: Literal["joint", "link", "robot"]
+    tag: Literal["joint", "link", "robot", "actuator"]
     ours: str | None
     theirs: str | None
     first: str
@@ -67,7 +69,7 @@ class Attribute:
 class DescriptionFreedom:
     """A difference of two descriptions that is none of the robots, in words."""
 
-    kind: Literal["frame", "axis", "order", "links", "inertia"]
+    kind: Literal["frame", "axis", "order", "links", "inertia", "contacts"]
     ours: str | None
     theirs: str | None
     message: str
@@ -90,6 +92,8 @@ def attributes(ours: Model, theirs: Model, found: Fit, tolerance: float) -> Iter
 
 
 def _of_joint(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> Iterator[Attribute]:
+    if not joint.moves:
+        return  # its type differs, and a joint that does not move has nothing else
     if mine.name != joint.name:
         yield Attribute("name", "joint", mine.name, joint.name, mine.name, joint.name, mine.line, joint.line)
     rows: list[tuple[Kind, float, float]] = [
@@ -101,11 +105,19 @@ def _of_joint(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> Ite
     for kind, first, second in rows:
         if differs(first, second, tolerance):
             yield Attribute(
-                kind, "joint", mine.name, joint.name, _number(first), _number(second), mine.line, joint.line
+                kind,
+                "joint",
+                mine.name,
+                joint.name,
+                number_text(first),
+                number_text(second),
+                mine.line,
+                joint.line,
             )
 
 
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
+    """Write a number; one that is infinite limits nothing."""
     return "none" if np.isinf(value) else f"{value + 0.0:.9g}"
 
 
@@ -157,16 +169,8 @@ def _of_shapes(
     tolerance: float,
 ) -> Iterator[Attribute]:
     """Compare the shapes of a body, wherever in its links they are; meshes by their names and scales."""
-    mine = _shapes(kind, ours, found.ours.links[each.ours], found, None)
-    left = _shapes(kind, theirs, found.theirs.links[each.theirs], found, each)
-    limit = max(tolerance, NEGLIGIBLE)
-    unmatched = []
-    for shape in mine:
-        same = next((other for other in left if shape.equals(other, limit, found.ours.reach)), None)
-        if same is None:
-            unmatched.append(shape.words)
-        else:
-            left = [other for other in left if other is not same]
+    _, alone, left = _matched_shapes(kind, ours, theirs, found, each, tolerance)
+    unmatched = [shape.words for shape in alone]
     if unmatched or left:
         names = [
             model.links[numbers[0]]
@@ -184,10 +188,44 @@ def _of_shapes(
         yield Attribute(kind, "link", names[0].name, names[1].name, first, second, *lines)
 
 
+def _matched_shapes(
+    kind: Literal["collision shapes", "visual shapes"],
+    ours: Model,
+    theirs: Model,
+    found: Fit,
+    each: BodyFit,
+    tolerance: float,
+) -> tuple[list[tuple[_ShapeOfBody, _ShapeOfBody]], list[_ShapeOfBody], list[_ShapeOfBody]]:
+    """Return the equal shapes of a body, those that only the first one has, and those of the second one."""
+    mine = _shapes(kind, ours, found.ours.links[each.ours], found, None)
+    left = _shapes(kind, theirs, found.theirs.links[each.theirs], found, each)
+    limit = max(tolerance, NEGLIGIBLE)
+    pairs, alone = [], []
+    for shape in mine:
+        same = next((other for other in left if shape.equals(other, limit, found.ours.reach)), None)
+        if same is None:
+            alone.append(shape)
+        else:
+            pairs.append((shape, same))
+            left = [other for other in left if other is not same]
+    return pairs, alone, left
+
+
+def collision_pairs(
+    ours: Model, theirs: Model, found: Fit, tolerance: float
+) -> Iterator[tuple[ShapeNumber, ShapeNumber]]:
+    """Yield the collision shapes that are equal in both robots, wherever in the links of a body they are."""
+    for each in found.bodies:
+        pairs, _, _ = _matched_shapes("collision shapes", ours, theirs, found, each, tolerance)
+        yield from ((mine.number, other.number) for mine, other in pairs if mine.number and other.number)
+
+
 @dataclass(frozen=True)
 class _ShapeOfBody:
-    """A shape with its pose T (4, 4) in the frame of our body: what is equal or not, and what is as large."""
+    """A shape with its pose T (4, 4) in the frame of our body: what is equal or not, and what is as large;
+    `number` is its own, None for a fault."""
 
+    number: ShapeNumber | None
     kind: tuple[object, ...]
     sizes: Floats
     T: Floats
@@ -219,24 +257,26 @@ def _shapes(
             )
         except DescriptionError as error:
             words = f"a fault ({error.message})"
-            shapes.append(_ShapeOfBody((words,), np.zeros(0), np.eye(4), words))
+            shapes.append(_ShapeOfBody(None, (words,), np.zeros(0), np.eye(4), words))
             continue
         if not placed:
             continue
         T = rounded(skeleton.link_pose(number))
         if each is not None:
             T = rounded(each.D) @ T
-        shapes += [_shape_of_body(shape, T @ shape.origin.matrix) for shape in placed]
+        shapes += [
+            _shape_of_body((name, k), shape, T @ shape.origin.matrix) for k, shape in enumerate(placed)
+        ]
     return shapes
 
 
-def _shape_of_body(placed: Visual | Collision, T: Floats) -> _ShapeOfBody:
+def _shape_of_body(own: ShapeNumber, placed: Visual | Collision, T: Floats) -> _ShapeOfBody:
     """Take a shape apart; a mesh is its file's name and its scale."""
     shape = placed.shape
     if isinstance(shape, Mesh):
         scale = "" if shape.scale == (1.0, 1.0, 1.0) else f" scaled by {vector_text(shape.scale, DIGITS)}"
         name = PurePath(shape.name).name
-        return _ShapeOfBody(("mesh", name), np.array(shape.scale), T, f"mesh {name}{scale}")
+        return _ShapeOfBody(own, ("mesh", name), np.array(shape.scale), T, f"mesh {name}{scale}")
     kind: list[object] = [type(shape).__name__.lower()]
     sizes: list[float] = []
     words = []
@@ -248,7 +288,7 @@ def _shape_of_body(placed: Visual | Collision, T: Floats) -> _ShapeOfBody:
         sizes += [float(number) for number in numbers]
         words.append(f"{name} {vector_text(map(float, numbers), DIGITS)}")
     text = " ".join([str(kind[0]), ", ".join(words)]).strip()
-    return _ShapeOfBody(tuple(kind), np.array(sizes), T, text)
+    return _ShapeOfBody(own, tuple(kind), np.array(sizes), T, text)
 
 
 def frame_differences(
@@ -279,7 +319,7 @@ def frame_differences(
         if is_body:
             yield DescriptionFreedom("frame", frame.name, frame.name, f"frame of {frame.name} {moved}")
         else:
-            lines = _line(ours, frame.name), _line(theirs, frame.name)
+            lines = line_of_link(ours, frame.name), line_of_link(theirs, frame.name)
             yield Attribute("frame", "link", frame.name, frame.name, "", moved, *lines)
 
 
@@ -300,8 +340,9 @@ def _only_names_a_place(model: Model, frame: str) -> bool:
         return False
 
 
-def _line(model: Model, frame: str) -> int | None:
-    link = next((link for link in model.links if link.name == frame), None)
+def line_of_link(model: Model, name: str) -> int | None:
+    """Return the line of a link; None for a frame that is no link."""
+    link = next((link for link in model.links if link.name == name), None)
     return None if link is None else link.line
 
 
@@ -327,7 +368,7 @@ def freedoms(found: Fit, tolerance: float) -> Iterator[DescriptionFreedom]:
                 "links",
                 first[0] if first else None,
                 second[0] if second else None,
-                f"a body of {_listed(first)} is described as {_listed(second)}",
+                f"a body of {_heavy_names(first)} is described as {_heavy_names(second)}",
             )
 
 
@@ -336,8 +377,11 @@ def _heavy_links(model: Model, numbers: list[int]) -> list[str]:
     return [link.name for link in links if link.inertial is not None and link.inertial.mass]
 
 
-def _listed(names: list[str]) -> str:
-    if not names:
-        return "no link with mass"
+def _heavy_names(names: list[str]) -> str:
+    return listed(names) if names else "no link with mass"
+
+
+def listed(names: list[str]) -> str:
+    """Write the first three names, and how many more there are."""
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return f"{', '.join(names[:3])}{more}"

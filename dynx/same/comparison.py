@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,6 +19,7 @@ from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.same.attributes import Attribute, DescriptionFreedom, attributes, frame_differences, freedoms
 from dynx.same.bounds import bounds
+from dynx.same.contacts import actuator_differences, contact_differences
 from dynx.same.decimals import fifty_digits, rounded
 from dynx.same.effects import ElementEffect, values, values_of_variants
 from dynx.same.elements import (
@@ -119,6 +120,7 @@ def same_robot(
         for note in each.model.notes
         if note.message.startswith("not read")
     ]
+    notes += _open_parts(first, second)
     ours, theirs = (without_standing_mimics(each.model) for each in (first, second))
     skeleton = exact_skeleton(ours)
     analysis = analyse(skeleton, theirs, tolerance)
@@ -133,6 +135,10 @@ def same_robot(
         frames = list(frame_differences(ours, theirs, analysis.fit, max(tolerance, 1e-15)))
         free = [each for each in frames if isinstance(each, DescriptionFreedom)]
         apart += [each for each in frames if isinstance(each, Attribute)]
+        contacts = [*contact_differences(first.model, second.model, analysis.fit, max(tolerance, 1e-15))]
+        apart += [each for each in contacts if isinstance(each, Attribute)]
+        apart += actuator_differences(first.model, second.model, analysis.fit, max(tolerance, 1e-15))
+        free += [each for each in contacts if isinstance(each, DescriptionFreedom)]
         free += [*freedoms(analysis.fit, tolerance), *_unseen(analysis)]
         limits = bounds(analysis.fit, _unseen_bodies(analysis)) if same else None
     root = analysis.fit.bodies[0].D
@@ -187,6 +193,16 @@ def _with_one_base(first: _Loaded, second: _Loaded) -> tuple[_Loaded, _Loaded, l
     lines = first.model.links[0].line, second.model.links[0].line
     found = Unmatched("base", first.model.root, second.model.root, *lines, message)
     return first, replace(second, model=second.model.with_base(kinds[0])), [], [found]
+
+
+def _open_parts(first: _Loaded, second: _Loaded) -> Iterator[str]:
+    """Yield notes on what only one description states, which therefore is not compared."""
+    for one, other in ((first, second), (second, first)):
+        if other.model.actuators is None and one.model.actuators:
+            yield f"{other.name} states no actuators; those of {one.name} are not compared"
+        stated = one.model.contact_filter
+        if other.model.contact_filter is None and stated is not None and stated.restricts:
+            yield f"{other.name} leaves open which shapes touch; what {one.name} states is not compared"
 
 
 # -- what differs -----------------------------------------------------------------------------------

@@ -6,7 +6,6 @@ inertias. Values are those of `ours` in the frames of `theirs`.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations, islice
@@ -22,8 +21,9 @@ from dynx.same.decimals import decimals, fifty_digits, rounded
 from dynx.same.fit import BodyFit, Fit, angle_of, drive, fit
 from dynx.same.matching import UNCHANGED, BodyPair, Matching, MatchingPlan
 from dynx.same.observability import observability_of
+from dynx.same.registration import principal_frames
 from dynx.same.scales import inertia_ratio
-from dynx.same.skeleton import Skeleton, float_inertia, subtract, transformed
+from dynx.same.skeleton import Skeleton, are_alike, float_inertia, subtract, transformed
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous, inverse
@@ -194,61 +194,81 @@ def _analysed(
 
 def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[DifferingElement]:
     """Yield fixed joints of `theirs`, in document order, below which elements differ, each placed so that the
-    first of these does not."""
+    first joint or the first inertia of these does not."""
     found = analysis.fit
     model = found.theirs.model
     above = {joint.child: joint for joint in model.joints}
-    below: dict[str, DifferingElement] = {}
-    counts: Counter[str] = Counter()
+    below: dict[str, list[DifferingElement]] = {}
     for element in analysis.elements:
         if element.tag == "joint" and (element.part != "origin" or not model.joint(element.theirs).moves):
             continue
         link = element.theirs if element.tag == "link" else model.joint(element.theirs).parent
         while link in above and not above[link].moves:
-            below.setdefault(above[link].name, element)
-            counts[above[link].name] += 1
+            below.setdefault(above[link].name, []).append(element)
             link = above[link].parent
-    mine = {joint.name: joint for joint in ours.joints if not joint.moves}
+    mine = {name: joint for name, joint in _named_counterparts(ours, model).items() if not joint.moves}
     for joint in [joint for joint in model.joints if joint.name in below and joint.name not in tried]:
         # What is written as in the other description is not at fault; what has no counterpart there may be
         # if several elements, or the place of a joint, depend on it.
         # A single element below it that is written otherwise is as good an explanation.
+        elements = below[joint.name]
         if joint.name in mine:
-            several = counts[joint.name] > 1 or below[joint.name].unchanged
-            suspect = several and mine[joint.name].origin != joint.origin
+            several = len(elements) > 1 or elements[0].unchanged
+            suspect = several and not are_alike(mine[joint.name].origin, joint.origin)
         else:
-            suspect = below[joint.name].tag == "joint" or counts[joint.name] > 1
+            suspect = elements[0].tag == "joint" or len(elements) > 1
         if suspect:
-            placed = _placed(found, ours, joint, below[joint.name])
-            if placed is not None:
-                yield placed
+            # The place of a joint says exactly where its parent is, whatever the frames of links.
+            joints, links = ([each for each in elements if each.tag == tag] for tag in ("joint", "link"))
+            for element in (*joints[:1], *links[:1]):
+                with fifty_digits():
+                    displacements = [*_displacements(found, joint, element)]
+                for displacement in displacements:
+                    placed = _placed(found, mine.get(joint.name), joint, displacement)
+                    if placed is not None:
+                        yield placed
 
 
-def _placed(found: Fit, ours: Model, joint: Joint, element: DifferingElement) -> DifferingElement | None:
-    """Return the element of a fixed joint that is placed so that another element below it is right."""
+def _displacements(found: Fit, joint: Joint, element: DifferingElement) -> Iterator[Array]:
+    """Yield the displacements (4, 4), in the body of a fixed joint, that make another element below it right:
+    of a link both by its frame and by its inertia, in case its frame is moved."""
+    ours, theirs = found.ours, found.theirs
+    fits = {each.theirs: each for each in found.bodies}
+    here = fits[theirs.body_of[joint.child]]
+    back = inverse(here.D)
+    if element.tag == "joint":
+        each = fits[theirs.number[element.theirs]]
+        yield back @ ours.exact[each.ours] @ each.D @ inverse(theirs.exact[each.theirs])
+        return
+    if element.ours is None or ours.body_of.get(element.ours) != here.ours:
+        return
+    now, wanted = (
+        skeleton.link_pose([link.name for link in skeleton.model.links].index(name))
+        for skeleton, name in ((theirs, element.theirs), (ours, element.ours))
+    )
+    yield back @ wanted @ inverse(now)
+    mine = ours.heavy_links[here.ours].get(element.ours)
+    other = theirs.heavy_links[here.theirs].get(element.theirs)
+    if mine is None or other is None or not (float(mine.mass) > 0.0 and float(other.mass) > 0.0):
+        return
+    (frame, *_), symmetric = principal_frames(mine)
+    if not symmetric:
+        turned = [rounded(back) @ frame @ inverse(each) for each in principal_frames(other)[0]]
+        yield decimals(max(turned, key=lambda T: float(np.trace(T[:3, :3]))))
+
+
+def _placed(found: Fit, mine: Joint | None, joint: Joint, displacement: Array) -> DifferingElement | None:
+    """Return the element of a fixed joint, whose counterpart is `mine`, that is displaced in its body."""
     theirs = found.theirs
     names = {link.name: k for k, link in enumerate(theirs.model.links)}
-    my_names = {link.name: k for k, link in enumerate(found.ours.model.links)}
     with fifty_digits():
-        fits = {each.theirs: each for each in found.bodies}
-        here = fits[theirs.body_of[joint.child]]
-        if element.tag == "joint":
-            each = fits[theirs.number[element.theirs]]
-            now = theirs.exact[each.theirs]
-            wanted = inverse(here.D) @ found.ours.exact[each.ours] @ each.D
-        elif element.ours in my_names and found.ours.body_of[element.ours or ""] == here.ours:
-            now = theirs.link_pose(names[element.theirs])
-            wanted = inverse(here.D) @ found.ours.link_pose(my_names[element.ours or ""])
-        else:
-            return None
         own = theirs.link_pose(names[joint.child])
-        moved = wanted @ inverse(now) @ own
+        moved = displacement @ own
         place = inverse(theirs.link_pose(names[joint.parent])) @ moved
         off = inverse(own) @ moved
         turn, shift = angle_of(off), float(np.linalg.norm(rounded(off[:3, 3])))
     if max(turn, shift / found.ours.reach) < SNAP:
         return None
-    mine = next((each for each in ours.joints if each.name == joint.name and not each.moves), None)
     pose = nearest_pose(place, joint.origin if mine is None else mine.origin)
     return DifferingElement(
         "origin",
@@ -260,7 +280,7 @@ def _placed(found: Fit, ours: Model, joint: Joint, element: DifferingElement) ->
         "none" if mine is None else pose_text(mine.origin),
         pose_text(joint.origin),
         (FieldChange("joint", joint.name, "origin", pose),),
-        unchanged=mine is not None and mine.origin == joint.origin,
+        unchanged=mine is not None and are_alike(mine.origin, joint.origin),
     )
 
 
@@ -278,8 +298,9 @@ def _line(model: Model, element: DifferingElement) -> int:
 
 
 def _other_types(ours: Model, theirs: Model) -> Iterator[DifferingElement]:
-    """Yield the joints of both names of which one is fixed or slides and the other turns."""
-    mine = {joint.name: joint for joint in ours.joints}
+    """Yield the joints of one name, or with links of one name, of which one is fixed or slides and the other
+    turns."""
+    mine = _named_counterparts(ours, theirs)
     drivers = set(theirs.joint_names)
     for joint in theirs.joints:
         other = mine.get(joint.name)
@@ -304,6 +325,16 @@ def _other_types(ours: Model, theirs: Model) -> Iterator[DifferingElement]:
             joint.type,
             tuple(changes),
         )
+
+
+def _named_counterparts(ours: Model, theirs: Model) -> dict[str, Joint]:
+    """Return the joint of `ours` of the same name, or else with a child link of the same name, by the name of
+    the joint of `theirs`: a fixed joint of MJCF has no name, and its link has."""
+    mine = {joint.name: joint for joint in ours.joints}
+    names = {joint.name for joint in theirs.joints}
+    children = {joint.child: joint for joint in ours.joints if joint.name not in names}
+    pairs = ((joint.name, mine.get(joint.name, children.get(joint.child))) for joint in theirs.joints)
+    return {name: joint for name, joint in pairs if joint is not None}
 
 
 def _kind(joint: Joint) -> str:
@@ -358,7 +389,7 @@ def _origin(found: Fit, each: BodyFit, parent: BodyFit) -> DifferingElement:
         pose_text(mine.origin),
         pose_text(joint.origin),
         (FieldChange("joint", joint.name, "origin", pose),),
-        unchanged=mine.origin == joint.origin,
+        unchanged=are_alike(mine.origin, joint.origin),
     )
 
 
@@ -396,7 +427,7 @@ def _moved_axis(found: Fit, each: BodyFit) -> DifferingElement:
         pose_text(mine.origin),
         pose_text(joint.origin),
         tuple(changes),
-        unchanged=mine.origin == joint.origin,
+        unchanged=are_alike(mine.origin, joint.origin),
     )
 
 
@@ -627,7 +658,7 @@ class _Inertias:
             _beside_text(None if mine is None else mine.inertial, my_others),
             _beside_text(link.inertial, others),
             (FieldChange("link", link.name, "inertial", new),),
-            unchanged=mine is not None and mine.inertial == link.inertial,
+            unchanged=mine is not None and are_alike(mine.inertial, link.inertial),
         )
 
     def _beside(self, skeleton: Skeleton, links: list[int], own: int | None) -> list[str]:

@@ -21,7 +21,7 @@ from dynx.rbd.base_parameters import rotation_to_axis, split_inertia
 from dynx.same.limits import limit_differences
 from dynx.same.registration import candidates
 from dynx.same.scales import extent, inertia_ratio
-from dynx.same.skeleton import Skeleton, subtract, transformed
+from dynx.same.skeleton import Skeleton, are_alike, subtract, transformed
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
@@ -280,9 +280,10 @@ class Matching:
         plans = [self._joined(i, j, D) for i, j in matched]
         missing = [i for i in self.ours.children[a] if i not in {i for i, _ in matched}]
         extra = [j for j in self.theirs.children[b] if j not in {j for _, j in matched}]
-        lost = sum(self.ours.sizes[i] for i in missing) + sum(self.theirs.sizes[j] for j in extra)
+        lost = sum(_lost(self.ours, self.theirs, i) for i in missing)
+        lost += sum(_lost(self.theirs, self.ours, j) for j in extra)
         return MatchingPlan(
-            sum(plan.cost for plan in plans) + 2.0 * lost,
+            sum(plan.cost for plan in plans) + lost,
             tuple(pair for plan in plans for pair in plan.pairs),
             (*missing, *(i for plan in plans for i in plan.missing)),
             (*extra, *(j for plan in plans for j in plan.extra)),
@@ -372,9 +373,22 @@ class Matching:
         if cost is None:
             cost = 0.0 if a == ROOT else self._axis_cost(a, b, D)
             if self._observes(a) and not self._has_same_inertia(a, b, D):
-                cost += _cost(self._has_equal_inertials(a, b))
+                cost += self._inertia_cost(a, b, D)
             self._own_costs[key] = cost
         return cost
+
+    def _inertia_cost(self, a: int, b: int, D: Floats) -> float:
+        """Return how many inertias of links must be replaced for those of two bodies to coincide."""
+        one = _cost(self._has_equal_inertials(a, b))
+        mine, other = self.ours.heavy_links[a], self.theirs.heavy_links[b]
+        if len(mine) == 1 or mine.keys() != other.keys():
+            # What is split otherwise is replaced as a whole.
+            return one
+        differing = 0
+        for name, inertia in mine.items():
+            difference = subtract(inertia, transformed(other[name], D))
+            differing += inertia_ratio(difference, inertia, self.ours.whole) > self.tolerance
+        return max(differing, 1) * one
 
     def _axis_cost(self, a: int, b: int, D: Floats) -> float:
         """Return how many elements must be replaced for the joint axes of two bodies to coincide."""
@@ -408,7 +422,7 @@ class Matching:
         return known
 
     def _has_equal_origins(self, a: int, b: int) -> bool:
-        return self.ours.joints[a].origin == self.theirs.joints[b].origin
+        return are_alike(self.ours.joints[a].origin, self.theirs.joints[b].origin)
 
     def _has_equal_inertials(self, a: int, b: int) -> bool:
         """Check whether the links of two bodies are written with the same inertials."""
@@ -418,7 +432,9 @@ class Matching:
                 {each.model.links[k].name: each.model.links[k].inertial for k in each.links[body]}
                 for each, body in ((self.ours, a), (self.theirs, b))
             )
-            known = self._equal_inertials[a, b] = mine == other
+            known = self._equal_inertials[a, b] = mine.keys() == other.keys() and all(
+                are_alike(inertial, other[name]) for name, inertial in mine.items()
+            )
         return known
 
     def _has_same_inertia(self, a: int, b: int, D: Floats) -> bool:
@@ -466,6 +482,15 @@ def _first_two(entry: tuple[Any, ...]) -> tuple[float, int]:
 
 def _is_identity(T: Floats) -> bool:
     return float(np.max(np.abs(T - np.eye(4)))) < 1e-12
+
+
+def _lost(skeleton: Skeleton, other: Skeleton, body: int) -> float:
+    """Return the cost of a body without counterpart and of all below it. If the other robot has a joint of
+    that name, both are one subtree at another place, whose halves cost 1 each."""
+    known = other.number.get(skeleton.joints[body].name)
+    if known is not None and skeleton.bodies[body].revolute == other.bodies[known].revolute:
+        return 1.0
+    return 2.0 * skeleton.sizes[body]
 
 
 def _cost(unchanged: bool) -> float:

@@ -95,7 +95,7 @@ def _frames(skeleton: Skeleton, body: int, inertia: RigidInertia) -> Iterator[li
     if center is None:
         yield []
     else:
-        principal, symmetric = _principal_frames(inertia)
+        principal, symmetric = principal_frames(inertia)
         yield principal
         lines += [(center, axis) for axis in symmetric]
     for line in lines:
@@ -117,7 +117,7 @@ def _line(skeleton: Skeleton, child: int) -> Line:
     return T[:3, 3], T[:3, :3] @ skeleton.axes[child]
 
 
-def _principal_frames(inertia: RigidInertia) -> tuple[list[Floats], list[Floats]]:
+def principal_frames(inertia: RigidInertia) -> tuple[list[Floats], list[Floats]]:
     """Return the frames of the principal axes at the centre of mass, and the axis of a symmetric body."""
     mass, h = float(inertia.mass), inertia.first_moment
     H = skew(h)

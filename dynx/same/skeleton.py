@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from dynx.model import Model
-from dynx.model.elements import IDENTITY, Joint
+from dynx.model.elements import IDENTITY, Inertial, Joint, Pose
 from dynx.model.mechanism import ROOT, Body, Mechanism, build_mechanism
 from dynx.model.topology import lock_joint
 from dynx.same.decimals import decimals, fifty_digits, rounded
@@ -58,6 +58,32 @@ def transformed(inertia: RigidInertia, T: Array) -> RigidInertia:
     return inertia.transform(T[:3, :3], T[:3, 3])
 
 
+ALIKE = 1e-12
+"""Difference of two numbers that are the same but for rounding, relative to the largest of their kind."""
+
+
+def are_alike(one: Pose | Inertial | None, other: Pose | Inertial | None) -> bool:
+    """Check whether two descriptions state the same pose, or the same inertia of a link, to rounding: in
+    other units, angles or axes of the tensor too."""
+    if one == other or one is None or other is None:
+        return one == other
+    if isinstance(one, Pose) or isinstance(other, Pose):
+        assert isinstance(one, Pose)
+        assert isinstance(other, Pose)
+        T, S = one.matrix, other.matrix
+        size = max(1.0, float(np.max(np.abs(T[:3, 3]))))
+        return bool(np.max(np.abs(T - S)) <= ALIKE * size)
+    pairs = zip(_numbers_of(one), _numbers_of(other), strict=True)
+    return all(bool(np.max(np.abs(x - y)) <= ALIKE * np.max(np.abs(x))) for x, y in pairs)
+
+
+def _numbers_of(inertial: Inertial) -> tuple[Floats, Floats, Floats]:
+    """Return mass, centre of mass and tensor about it, in the axes of the link."""
+    T = inertial.origin.matrix
+    R = T[:3, :3]
+    return np.array([inertial.mass]), T[:3, 3], R @ inertial.tensor @ R.T
+
+
 class Skeleton:
     """Bodies of a model, numbered as in its mechanism; ROOT is the root body.
 
@@ -92,6 +118,20 @@ class Skeleton:
     def inertias(self) -> dict[int, RigidInertia]:
         """Merged inertias in float64."""
         return {body: float_inertia(self.inertia(body)) for body in self.children}
+
+    @cached_property
+    def heavy_links(self) -> dict[int, dict[str, RigidInertia]]:
+        """Inertias in float64 of the links of each body that have one, by name, in the frame of the body."""
+        found: dict[int, dict[str, RigidInertia]] = {body: {} for body in self.links}
+        for body, numbers in self.links.items():
+            for k in numbers:
+                inertial = self.model.links[k].inertial
+                if inertial is not None and (inertial.mass or inertial.tensor.any()):
+                    frame = self.mechanism.frames[k]
+                    own = float_inertia(self.mechanism.links[k].inertia)
+                    moved = own.transform(rounded(frame.R), rounded(frame.p))
+                    found[body][self.model.links[k].name] = moved
+        return found
 
     @cached_property
     def grouped_root(self) -> RigidInertia:

@@ -1,6 +1,6 @@
 """Shapes of links and bodies: primitives and meshes, their volumes and moments, and the files of meshes."""
 
-from dynx.model.geometry.links import Appearance, Collision, Geometry, LinkGeometry, Visual
+from dynx.model.geometry.links import Appearance, Collision, ContactFilter, Geometry, LinkGeometry, Visual
 from dynx.model.geometry.mesh import Mesh
 from dynx.model.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HeightField, Plane, Sphere
 from dynx.model.geometry.solids import Shape, SolidProperties, solid_properties
@@ -10,6 +10,7 @@ __all__ = [
     "Box",
     "Capsule",
     "Collision",
+    "ContactFilter",
     "Cylinder",
     "Ellipsoid",
     "Geometry",

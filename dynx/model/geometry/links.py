@@ -78,6 +78,42 @@ class LinkGeometry:
     collision_fault: DescriptionError | None = field(default=None, compare=False)
 
 
+ShapeNumber = tuple[str, int]
+"""A collision shape: the name of its link, and its number among those of the link, from 0."""
+
+
+@dataclass(frozen=True)
+class ContactFilter:
+    """Which collision shapes of a robot may touch, as MJCF states it. It is data: scenes have their own.
+
+    Two shapes may touch if contype of one and conaffinity of the other share a bit, unless their links are
+    `excluded`, rigidly connected, or on both sides of one joint of which neither is fixed in the world.
+    Shapes that are `paired` may touch in any case.
+    """
+
+    bits: Mapping[str, tuple[tuple[int, int], ...]]
+    """contype and conaffinity of the collision shapes, by their link."""
+    excluded: tuple[tuple[str, str], ...] = ()
+    """Pairs of links whose shapes do not touch."""
+    paired: tuple[tuple[ShapeNumber, ShapeNumber], ...] = ()
+    enabled: bool = True
+    """False if no contacts are computed at all (MJCF's flag ``contact``)."""
+    filters_parents: bool = True
+    """False if links on both sides of a joint may touch (MJCF's flag ``filterparent``)."""
+
+    @property
+    def restricts(self) -> bool:
+        """True unless exactly the shapes may touch that MJCF lets touch by default."""
+        stated = any(set(each) - {(1, 1)} for each in self.bits.values())
+        return bool(stated or self.excluded or self.paired) or not (self.enabled and self.filters_parents)
+
+    def bits_of(self, shape: ShapeNumber) -> tuple[int, int]:
+        """Return contype and conaffinity of a shape, 1 and 1 where none are stated."""
+        link, number = shape
+        stated = self.bits.get(link, ())
+        return stated[number] if number < len(stated) else (1, 1)
+
+
 Links = Mapping[str, LinkGeometry]
 
 

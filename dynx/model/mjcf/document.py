@@ -28,6 +28,11 @@ _ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 WITH_DEFAULTS = frozenset(["geom", "joint", "site", "mesh", "material"])
 """Elements that are read and take attributes that they lack from a class of defaults."""
 
+ACTUATORS = frozenset(
+    ["adhesion", "cylinder", "damper", "dcmotor", "general", "intvelocity", "motor", "muscle"]
+) | {"plugin", "position", "velocity"}
+"""Elements of ``<actuator>``, whose attributes a class of defaults holds for all of them together."""
+
 _POSE = frozenset(["pos", *_ORIENTATIONS])
 _NAMED = frozenset(["name", "class", "group", "user"])
 _SOFTNESS = frozenset(["margin", "solimp", "solref"])
@@ -221,6 +226,19 @@ class MjcfText:
             given = {name: value for name, value in given.items() if name not in _ORIENTATIONS}
         return self.reading.like(element, {**given, **own})
 
+    def is_limited(self, element: Element, limited: str, limits: str, what: str) -> bool:
+        """Check whether a range is stated and acts. Raises DescriptionError where ``limited`` demands one,
+        and where only ``autolimits`` could say."""
+        choice = self.reading.choice(element, limited, what, ("auto", "true", "false"), "auto")
+        given = limits in element.attributes
+        if choice == "true" and not given:
+            raise self.reading.error(element, f'{what} has {limited}="true" and no {limits}')
+        if choice == "auto" and given and not self.compiler_of(element).autolimits:
+            raise self.reading.error(
+                element, f'{what} has {limits} and not {limited}, which autolimits="false" demands'
+            )
+        return given and choice != "false"
+
     def pose(self, element: Element, what: str) -> Floats:
         """Return the pose (4, 4) of ``pos`` and of the orientation of an element."""
         position = np.zeros(3)
@@ -411,7 +429,7 @@ def read_defaults(root: Element, reading: MjcfReading) -> tuple[dict[str, dict[s
         inherited = classes.get(name) or classes.get(parent or "", {})
         own = {tag: dict(attributes) for tag, attributes in inherited.items()}
         for child in element.children:
-            if child.tag in WITH_DEFAULTS:
+            if child.tag in WITH_DEFAULTS or child.tag in ACTUATORS:
                 given = dict(own.get(child.tag, {}))
                 if any(each in child.attributes for each in _ORIENTATIONS):
                     given = {key: value for key, value in given.items() if key not in _ORIENTATIONS}

@@ -21,6 +21,7 @@ from dynx.errors import escaped, nearest, shown
 from dynx.model.elements import (
     IDENTITY,
     INFINITY,
+    Actuator,
     Frame,
     Inertial,
     Joint,
@@ -34,8 +35,11 @@ from dynx.model.elements import (
     Vector,
 )
 from dynx.model.geometry import Geometry, LinkGeometry
+from dynx.model.geometry.links import ContactFilter
 from dynx.model.geometry.solids import inertial_of
+from dynx.model.mjcf.actuators import read_actuators
 from dynx.model.mjcf.attributes import UNLIMITED
+from dynx.model.mjcf.contacts import read_contacts
 from dynx.model.mjcf.document import MjcfText, turn
 from dynx.model.mjcf.expansion import read_document
 from dynx.model.mjcf.extension import MIMIC, Extension
@@ -89,7 +93,9 @@ _NOT_IN_TREE = {
     "extension": "no plug-in is used",
 }
 _OF_SCENES = ("equality", "contact", "keyframe")
-"""Sections that a scene reads and one robot has not."""
+"""Sections that a scene reads."""
+_OF_ONE_ROBOT = ("actuator", "contact")
+"""Sections that are read of one robot, as data."""
 _IN_ROOT = frozenset(
     ["compiler", "option", "size", "statistic", "visual", "default", "asset", "worldbody", "custom"]
 )
@@ -170,9 +176,7 @@ def read_trees(data: str | bytes, source: str, package_dirs: Iterable[StrPath] =
     document = read_document(data, source, package_dirs)
     if document is None:
         return None
-    pairs = [each.attributes for each in document.sections("contact") if each.tag == "pair"]
-    paired = frozenset(each[end] for each in pairs for end in ("geom1", "geom2") if end in each)
-    return _TreeReader(document, paired).read_trees()
+    return _TreeReader(document).read_trees()
 
 
 @dataclass
@@ -208,10 +212,12 @@ class _TreeParts:
 
 
 class _TreeReader:
-    def __init__(self, document: MjcfText, paired: frozenset[str] = frozenset()) -> None:
-        """`paired` are the geoms that collide because a pair of contacts names them."""
+    def __init__(self, document: MjcfText) -> None:
         self._document, self._reading = document, document.reading
-        self._geoms = GeomReader(document, paired)
+        self._contacts = read_contacts(document)
+        self._geoms = GeomReader(document, self._contacts.paired_geoms)
+        self._colliding: dict[str, list[Geom]] = {}
+        self._link_of: dict[str, str] = {WORLD: WORLD}
         self._parts = _TreeParts()
         self._held: dict[str, list[tuple[str, Element]]] = {}
         self._poses: dict[str, Floats] = {WORLD: np.eye(4)}
@@ -228,16 +234,20 @@ class _TreeReader:
 
     def read(self) -> Description:
         root = self._document.root
-        self._note_sections(root, _NOT_IN_TREE)
+        self._note_sections(
+            root, {tag: effect for tag, effect in _NOT_IN_TREE.items() if tag not in _OF_ONE_ROBOT}
+        )
         world = self._world(root)
         base = self._read_world(world)
         name = self._name(root)
         self._read_mimics()
         self._require_joints_of_motors(root)
         self._scale(self._total_mass_scale(root, self._parts.links))
+        actuators, contact_filter = self._read_actuators(), self._contact_filter()
         self._note_counts(root)
         self._document.options.note(self._reading, scene=False)
-        return self._description(name, base, self._document.options.gravity, self._reading.notes)
+        content = self._description(name, base, self._document.options.gravity, self._reading.notes)
+        return replace(content, actuators=actuators, contact_filter=contact_filter)
 
     def read_trees(self) -> MjcfTrees:
         root = self._document.root
@@ -491,6 +501,8 @@ class _TreeReader:
 
     def _add_contents(self, body: _BodyContent) -> None:
         self._parts.geometry[body.name] = self._geoms.geometry(body.geoms)
+        self._colliding[body.name] = [geom for geom in body.geoms if geom.collides]
+        self._link_of[body.element.attributes.get("name", "")] = body.name
         self._add_sites(body)
         for attribute in _NOT_READ_OF_BODIES:
             if body.element.attributes.get(attribute, "0") not in ("0", "false"):
@@ -615,20 +627,9 @@ class _TreeReader:
         value = self._reading.number_or(element, attribute, what, 0.0)
         return self._document.compiler_of(element).radians(value) if kind == "hinge" else value
 
-    def _limited(self, element: Element, limited: str, limits: str, what: str) -> bool:
-        choice = self._reading.choice(element, limited, what, ("auto", "true", "false"), "auto")
-        given = limits in element.attributes
-        if choice == "true" and not given:
-            raise self._reading.error(element, f'{what} has {limited}="true" and no {limits}')
-        if choice == "auto" and given and not self._document.compiler_of(element).autolimits:
-            raise self._reading.error(
-                element, f'{what} has {limits} and not {limited}, which autolimits="false" demands'
-            )
-        return given and choice != "false"
-
     def _limits(self, element: Element, name: str, kind: str, what: str) -> tuple[Limits, bool]:
         reading, limits = self._reading, Limits()
-        limited = self._limited(element, "limited", "range", what)
+        limited = self._document.is_limited(element, "limited", "range", what)
         if limited:
             ends = reading.numbers(element, "range", what, 2)
             lower, upper = map(self._document.compiler_of(element).radians, ends) if kind == "hinge" else ends
@@ -642,7 +643,7 @@ class _TreeReader:
             lower = lower if lower > -UNLIMITED else -INFINITY
             upper = upper if upper < UNLIMITED else INFINITY
             limits, limited = Limits(lower, upper), not lower == -upper == -INFINITY
-        if self._limited(element, "actuatorfrclimited", "actuatorfrcrange", what):
+        if self._document.is_limited(element, "actuatorfrclimited", "actuatorfrcrange", what):
             low, high = reading.numbers(element, "actuatorfrcrange", what, 2)
             if low == -high and high > 0.0:
                 limits = replace(limits, effort=high)
@@ -695,6 +696,39 @@ class _TreeReader:
                         f"<{escaped(element.tag)}> acts on the joint {shown(name)}, which no body has"
                         f"{nearest(name, known)}",
                     )
+
+    def _read_actuators(self) -> tuple[Actuator, ...]:
+        """Return the actuators of the robot, with notes on all of them: none acts."""
+        taken, left = read_actuators(self._document, {each.name: each for each in self._parts.joints})
+        if taken:
+            self._reading.notes.append(
+                Note(
+                    f"{_counted(len(taken), 'element')} of <actuator>: model.actuators has them as data, "
+                    "and none acts on a robot in dynx",
+                    taken[0].line,
+                )
+            )
+        if left:
+            element, reason = left[0]
+            self._reading.note(
+                element,
+                f"not read: {_counted(len(left), 'element')} of <actuator>; {_NOT_IN_TREE['actuator']} "
+                f"(the first is left out because {reason})",
+            )
+        return taken
+
+    def _contact_filter(self) -> ContactFilter:
+        """Return which shapes may touch, with a note on what is no part of the robot."""
+        found, left = self._contacts.of_robot(self._link_of, self._colliding)
+        if left:
+            self._reading.note(
+                left[0],
+                f"not read: {_counted(len(left), 'element')} of <contact>, which name a body or geom that "
+                "the robot has not, or that touches nothing",
+            )
+        if self._contacts.parameters is not None:
+            self._reading.note(self._contacts.parameters, "parameters of <pair> are not read")
+        return found
 
     def _dynamics(self, element: Element, what: str) -> JointDynamics:
         reading, given = self._reading, element.attributes

@@ -22,8 +22,19 @@ import numpy as np
 from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, UnsupportedFeatureError, shown
 from dynx.model.elements import IDENTITY, ZERO, Inertial, Joint, Limits, Link, Pose
-from dynx.model.geometry import Appearance, Collision, HeightField, LinkGeometry, Mesh, Plane, Visual
+from dynx.model.geometry import (
+    Appearance,
+    Collision,
+    ContactFilter,
+    HeightField,
+    LinkGeometry,
+    Mesh,
+    Plane,
+    Visual,
+)
+from dynx.model.geometry.links import ShapeNumber
 from dynx.model.geometry.stated_mesh import StatedMesh
+from dynx.model.mjcf.actuators import write_actuators
 from dynx.model.mjcf.attributes import (
     MAX_DEPTH,
     UNLIMITED,
@@ -72,9 +83,9 @@ def write_mjcf(tree: Tree, /) -> str:
 
     `dynx.load` of the text returns a model with the same links, joints, frames, inertias, limits and
     coefficients, to rounding. MuJoCo compiles it unless a comment says why not. Angles are in radians. Visual
-    geoms are in group 2 and do not collide; collision geoms are in group 3. A motor acts on each joint with
-    a coordinate of its own; its range is the effort limit. Meshes are named by their full paths; ``dynx
-    convert`` copies them.
+    geoms are in group 2 and do not collide; collision geoms are in group 3. The actuators are those of the
+    robot. Where its description leaves them open, a motor acts on each joint with a coordinate of its own;
+    its range is the effort limit. Meshes are named by their full paths; ``dynx convert`` copies them.
 
     Raises DescriptionError for a name that MJCF cannot express and a limit that is NaN,
     UnsupportedFeatureError for a link named ``world`` that is not the root, and for too many links in a row.
@@ -98,17 +109,36 @@ class RobotWriter:
         """Sentences on what MJCF cannot say of the robot, each with its effect."""
         self._extension = Extension()
         self._root = root = new_document(_checked_name(tree.name))
-        SubElement(root, "option", gravity=text(tree.gravity))
+        option = SubElement(root, "option", gravity=text(tree.gravity))
+        self._filter = found = tree.contact_filter or ContactFilter({})
+        flags = [
+            name
+            for name, enabled in (("contact", found.enabled), ("filterparent", found.filters_parents))
+            if not enabled
+        ]
+        if flags:
+            SubElement(option, "flag", dict.fromkeys(flags, "disable"))
+        self._paired = {shape for pair in found.paired for shape in pair}
+        self._body_names: dict[str, str] = {}
+        self._pair_names: dict[ShapeNumber, str] = {}
         self._add_defaults()
         self._kinds: dict[str, list[str]] = {}
         self._assets = _Assets(SubElement(root, "asset"), mesh_path, image_path, self.notes, self._kinds)
         self._add_bodies(SubElement(root, "worldbody"))
+        self._add_contacts(SubElement(root, "contact"))
         self._equality, self._actuator = SubElement(root, "equality"), SubElement(root, "actuator")
         for joint in tree.joints:
             if joint.moves and joint.mimic is not None:
                 self._couple(joint)
-        for joint in tree.coordinate_joints:
-            self._add_motor(joint)
+        if tree.actuators is None:
+            for joint in tree.coordinate_joints:
+                self._add_motor(joint)
+        else:
+            moving = {joint.name for joint in tree.joints if joint.moves}
+            write_actuators(self._actuator, [each for each in tree.actuators if each.joint in moving])
+            for each in tree.actuators:
+                if each.joint not in moving:
+                    _add(self._kinds, "Actuators on joints that do not move are left out", each.joint)
         self._extension.write(root)
         for empty in [
             part for part in root if len(part) == 0 and not part.attrib and part.tag != "worldbody"
@@ -164,6 +194,7 @@ class RobotWriter:
                 self._add_joints(_body(bodies[joint.parent], link.name, _end(chain)), chain, link)
                 body = bodies[joint.parent][-1]
             bodies[link.name] = body
+            self._body_names[link.name] = WORLD if body is world else body.attrib["name"]
             if body is not world and link.inertial is not None:
                 SubElement(body, "inertial", _inertial_attributes(link.inertial))
             self._add_shapes(body, link)
@@ -274,11 +305,38 @@ class RobotWriter:
                 self.notes.append(
                     f"The {kind} shapes of link {shown(link.name)} are left out: {fault.message}."
                 )
-        every: tuple[Visual | Collision, ...] = (*shapes.visuals, *shapes.collisions)
-        for placed in every:
-            self._add_shape(body, link, placed)
+        for visual in shapes.visuals:
+            self._add_shape(body, link, visual)
+        for number, collision in enumerate(shapes.collisions):
+            shape = link.name, number
+            bits = self._filter.bits_of(shape)
+            given = {} if bits == (1, 1) else {"contype": text(bits[0]), "conaffinity": text(bits[1])}
+            geom = self._add_shape(body, link, collision, given)
+            if geom is not None and shape in self._paired:
+                if "name" not in geom.attrib:
+                    geom.set("name", free_name(collision.name or f"{link.name}_collision", self._geom_names))
+                    self._geom_names.add(geom.attrib["name"])
+                self._pair_names[shape] = geom.attrib["name"]
 
-    def _add_shape(self, body: Element, link: Link, placed: Visual | Collision) -> None:
+    def _add_contacts(self, section: Element) -> None:
+        """Add the exclusions and the pairs of geoms of the robot's contact filter."""
+        for first, second in self._filter.excluded:
+            ends = self._body_names.get(first), self._body_names.get(second)
+            if ends[0] is None or ends[1] is None:
+                _add(self._kinds, "Exclusions of links without a body are left out", f"{first}, {second}")
+            else:
+                SubElement(section, "exclude", body1=ends[0], body2=ends[1])
+        for one, two in self._filter.paired:
+            if one in self._pair_names and two in self._pair_names:
+                geoms = {"geom1": self._pair_names[one], "geom2": self._pair_names[two]}
+                SubElement(section, "pair", geoms)
+            else:
+                _add(self._kinds, "Contact pairs of shapes that are left out", f"{one[0]}, {two[0]}")
+
+    def _add_shape(
+        self, body: Element, link: Link, placed: Visual | Collision, bits: Mapping[str, str] | None = None
+    ) -> Element | None:
+        """Add a shape, with these attributes of its contacts; return None for one that is left out."""
         kind = "visual" if isinstance(placed, Visual) else "collision"
         what = f"A {kind} shape of link {shown(link.name)}"
         given: dict[str, str] = {"class": kind}
@@ -291,11 +349,11 @@ class RobotWriter:
         shape = placed.shape
         if isinstance(shape, HeightField):
             _add(self._kinds, "Height fields are left out", link.name)
-            return
+            return None
         if isinstance(shape, Mesh):
             name = self._assets.mesh(shape, what)
             if name is None:
-                return
+                return None
             given |= {"type": "mesh", "mesh": name}
         else:
             given |= primitive_attributes(shape)
@@ -303,7 +361,7 @@ class RobotWriter:
             _add(self._kinds, "MuJoCo accepts planes on bodies that do not move alone", link.name)
         if isinstance(placed, Visual) and placed.material is not None:
             given |= self._assets.material(placed.material, what)
-        SubElement(body, "geom", given | _pose_attributes(placed.origin))
+        return SubElement(body, "geom", given | _pose_attributes(placed.origin) | dict(bits or {}))
 
     # -- notes ----------------------------------------------------------------------------------
 

@@ -38,7 +38,7 @@ from dynx.model.sdf.extension import HOLD, LIMITS, LOCKED, NAME, NAMESPACE, ROTO
 from dynx.model.sdf.reader import UNLIMITED
 from dynx.model.tree import STANDARD_GRAVITY, Tree
 from dynx.model.urdf.reader import inertia_fault
-from dynx.model.urdf.writer import listed, note_of_kind
+from dynx.model.urdf.writer import listed, note_of_kind, notes_of_open_parts
 from dynx.model.xml.several_files import free_name
 from dynx.model.xml.values import name_fault
 
@@ -325,6 +325,7 @@ class SdfWriter:
     def _add_notes(self) -> None:
         tree = self._tree
         self.notes += [note_of_kind(kind, names) for kind, names in self._kinds.items()]
+        self.notes += notes_of_open_parts(self._tree, "SDF")
         followers = [joint.name for joint in tree.joints if joint.mimic is not None]
         if followers:
             self.notes.append(

@@ -191,6 +191,7 @@ def urdf_notes(tree: Tree) -> Iterator[str]:
     ):
         if names:
             yield f"{reason} ({listed(names)})."
+    yield from notes_of_open_parts(tree, "URDF")
     kinds: dict[str, list[str]] = {}
     for link in tree.links:
         shapes = tree.geometry.links.get(link.name, LinkGeometry())
@@ -211,6 +212,15 @@ def urdf_notes(tree: Tree) -> Iterator[str]:
                 kinds.setdefault(kind, []).append(link.name)
     for kind, names in kinds.items():
         yield note_of_kind(kind, names)
+
+
+def notes_of_open_parts(tree: Tree, language: str) -> Iterator[str]:
+    """Yield notes on actuators and contacts of a robot, which a format leaves open."""
+    if tree.actuators:
+        joints = dict.fromkeys(each.joint for each in tree.actuators)
+        yield f"{language} has no actuators of a robot; those of some joints are left out ({listed(joints)})."
+    if tree.contact_filter is not None and tree.contact_filter.restricts:
+        yield f"{language} does not state which shapes may touch; what the robot's file states is left out."
 
 
 def note_of_kind(kind: str, names: Sequence[str]) -> str:

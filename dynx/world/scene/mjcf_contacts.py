@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import combinations, combinations_with_replacement, islice, product
 
 from dynx.errors import shown
+from dynx.model.mjcf.contacts import read_contacts
 from dynx.model.mjcf.document import MjcfText
 from dynx.model.mjcf.reader import MjcfBody
 from dynx.model.mjcf.shapes import Geom, GeomContact
@@ -65,21 +66,11 @@ class ContactRules:
         `taken` are the names of parts."""
         self._reading, self._colliders, self._taken = document.reading, colliders, taken
         self._bodies = bodies
-        self._disabled = document.options.disabled("contact") is not None
-        self._filters_parents = document.options.disabled("filterparent") is None
-        self._excluded: set[frozenset[str]] = set()
-        self._pairs: dict[frozenset[str], Element] = {}
-        for element in document.sections("contact"):
-            ends = ("body1", "body2") if element.tag == "exclude" else ("geom1", "geom2")
-            if element.tag not in ("exclude", "pair"):
-                continue
-            stated = [self._reading.attribute(element, end, f"<{element.tag}>") for end in ends]
-            names = frozenset(stated)
-            if element.tag == "exclude":
-                self._excluded.add(frozenset(kept.get(name, name) for name in stated))
-            else:
-                self._pairs[names] = element
-        self._paired_names = frozenset().union(*self._pairs) if self._pairs else frozenset()
+        stated = read_contacts(document)
+        self._disabled, self._filters_parents = not stated.enabled, stated.filters_parents
+        self._excluded = {frozenset(kept.get(name, name) for name in pair) for pair in stated.excluded}
+        self._pairs = {frozenset(pair): element for pair, element in stated.paired.items()}
+        self._paired_names = stated.paired_geoms
 
     def touching_inside(self, robot: str) -> bool:
         """Check whether MuJoCo tests any two links of a robot."""

@@ -441,8 +441,9 @@ def test_what_is_not_part_of_the_model_is_named() -> None:
         '<body name="link"', '<body name="link" gravcomp="1"'
     )
     notes = "\n".join(map(str, dynx.load(text).notes))
-    for word in ("<actuator>", "<sensor>", "<equality>", "<tendon>", "<keyframe>", "<contact>"):
+    for word in ("<sensor>", "<equality>", "<tendon>", "<keyframe>", "<contact>"):
         assert f"not read: 1 element of {word}" in notes
+    assert "1 element of <actuator>: model.actuators has them as data" in notes
     for word in ("stiffness", "viscosity", "gravcomp", "polynomial"):
         assert word in notes
 
