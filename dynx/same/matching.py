@@ -143,7 +143,23 @@ class Matching:
                 break
         if found[0][0] == 0.0 or found[0][1] == 0:
             found = found[:1]
-        return min((self._chosen(ROOT, ROOT, D, 0.0) for _, _, D in found), key=lambda plan: plan.rank)
+        best = self._chosen(ROOT, ROOT, found[0][2], 0.0)
+        for _, _, D in found[1:]:
+            if (round(self._bound(ROOT, ROOT, D), 6), 0) < best.rank:
+                best = min(best, self._chosen(ROOT, ROOT, D, 0.0), key=lambda plan: plan.rank)
+        return best
+
+    def _bound(self, a: int, b: int, D: Floats) -> float:
+        """Return a lower bound on the cost of two bodies with the frames D: a child that fits none of the
+        other's children where it follows costs 1 at least."""
+        cost = self._own_cost(a, b, D)
+        for i in self.ours.children[a]:
+            back = inverse(self.ours.placements[i]) @ D
+            cost += not any(
+                self._alike(i, j) and self._own_cost(i, j, back @ self.theirs.placements[j]) == 0.0
+                for j in self.theirs.children[b]
+            )
+        return cost
 
     def _followed(self, a: int, b: int, D: Floats, limit: float) -> float:
         """Return how many elements differ if every frame follows from D, or any number from `limit` on."""
@@ -188,6 +204,8 @@ class Matching:
             if len(self._plans) > MAX_PLANS:
                 break
             if (round(replaced + cost, 6), 0) >= best.rank:
+                continue
+            if (round(replaced + self._bound(a, b, D), 6), 0) >= best.rank:
                 continue
             plan = self._chosen(a, b, D, replaced)
             if plan.rank < best.rank:
