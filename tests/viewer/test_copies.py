@@ -14,6 +14,7 @@ from dynx.errors import ArgumentError
 from dynx.spatial.scalar import Floats
 from dynx.viewer import Viewer
 from dynx.viewer.drawn_robot import MIN_COPIES
+from dynx.world import Scene, SceneRobot, World
 from tests.viewer.conftest import OpenPage, connected, pixel_of, until
 from tests.viewer.test_pose_channel import messages
 
@@ -137,6 +138,45 @@ def test_copies_are_clicked_hidden_seen_through_and_followed_one_by_one(open_pag
         assert not opened.errors
 
 
+INERTIAL = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+LIMIT = "<limit lower='-9' upper='9' effort='1000' velocity='100'/>"
+CART = (
+    f"<robot name='r'><link name='rail'/><link name='bridge'>{INERTIAL}</link>"
+    f"<link name='box'>{INERTIAL}<visual><geometry><box size='0.3 0.3 0.3'/></geometry></visual></link>"
+    "<joint name='y' type='prismatic'><parent link='rail'/><child link='bridge'/><axis xyz='0 1 0'/>"
+    f"{LIMIT}</joint><joint name='x' type='prismatic'><parent link='bridge'/><child link='box'/>"
+    f"<axis xyz='1 0 0'/>{LIMIT}</joint></robot>"
+)
+
+
+def test_the_pointer_drags_one_of_the_copies_of_a_world(open_page: OpenPage) -> None:
+    model, dragged = dynx.load(CART), 5
+    robots = [SceneRobot(f"c{k}", model, q=(float(k), 0.0)) for k in range(MIN_COPIES)]
+    with World(Scene("carts", robots=robots)) as world, world.view() as viewer:
+        assert viewer.view.drawn.copies
+        opened = open_page(viewer.url, (1000, 500))
+        (client,) = connected(viewer)
+        mouse, part = opened.page.mouse, f"c{dragged}/box"
+        top = viewer.view.drawn.pose(part)[:3, 3] + [0.0, 0.0, 0.15]
+        until(partial(hovers, opened.page, client, top, part), "the part under the pointer")
+        x, y = pixel_of(client, top)
+        mouse.down()
+        steps = iter(range(10_000))
+
+        def follows() -> bool:
+            # The page takes a press for a drag once the pointer moves; pixels to the right are along x and y.
+            mouse.move(x + 40.0 + next(steps) % 2, y)
+            viewer.view.step(10)
+            return bool(world.state.robots[f"c{dragged}"].q[1] > 0.05)
+
+        until(follows, "the cart that follows the pointer")
+        others = [world.state.robots[f"c{k}"].q[1] for k in range(MIN_COPIES) if k != dragged]
+        assert np.abs(others).max() < 1e-6
+        mouse.up()
+        until(lambda: not viewer.view._spring.pulls, "the end of the drag")
+        assert not opened.errors
+
+
 def shows_a_dark_box(viewer: Viewer) -> bool:
     return bool(viewer.screenshot((300, 200))[100, 150].max() < 120)
 
@@ -171,8 +211,6 @@ def test_batches_play_and_robots_of_a_world_are_copies(tmp_path: Path) -> None:
         viewer.export(tmp_path / "batch.png", size=(80, 60))
         viewer.export(tmp_path / "batch.html")
     assert f"{model.name} 7/" in (tmp_path / "batch.html").read_text(encoding="utf-8")
-    from dynx.world import Scene, SceneRobot, World
-
     scene = Scene("many", robots=[SceneRobot(f"c{k}", model) for k in range(MIN_COPIES)])
     with World(scene) as world, world.view(steps=False) as viewer:
         assert not viewer.view.drawn.robots
