@@ -504,7 +504,7 @@ _BEFORE_PICTURES = (
       watchCamera(camera);
       write(renderer.domElement, camera);
       fade();
-      castShadows();
+      castShadows(renderer, camera);
       layAxesOver();
       // viser draws its background over the whole picture also where there is none.
       const behind = window.__viserMutable.backgroundMaterial;

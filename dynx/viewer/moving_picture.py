@@ -17,7 +17,7 @@ STILL_AFTER = 0.3
 _CHECKS = 3
 """Number of checks, one after another, that must find no motion: a page that is slow draws between them."""
 
-CELL = 3.0
+CELL = 5.0
 """Largest size of the cells in which the vertices of a shape become one, while something moves, in pixels of
 the picture."""
 
@@ -25,14 +25,14 @@ _LIGHT = 200
 """Number of triangles up to which a shape is always drawn whole."""
 
 _LEVELS = 8
-"""Number of sizes of cells; the smallest divide the diagonal of a shape by two to this power."""
+"""Power of two by which the smallest cells divide the diagonal of a shape; there are two sizes a power."""
 
 _SAVED = 0.7
 """Share of the triangles of a shape above which coarser ones are not drawn instead."""
 
 ALWAYS_WHOLE = """
   const noteMotion = () => {}, noteMessage = () => {}, watchCamera = () => {};
-  const drawCoarsely = () => {}, drawWhole = () => {};
+  const drawCoarsely = () => {}, drawWhole = () => {}, levelWhileMoving = () => Infinity;
 """
 """Part of the script of a page that draws whole pictures, whose resolution viser chooses."""
 
@@ -146,6 +146,45 @@ COARSE_WHILE_MOVING = (
     found.boundingSphere = geometry.boundingSphere;
     return found;
   };
+  // The normal of each triangle is that of its last corner; others share the corner where they end elsewhere.
+  const faceted = (geometry) => {
+    const {position} = geometry.attributes, index = geometry.index;
+    const total = (index ?? position).count, used = new Uint8Array(position.count);
+    const corners = new Uint32Array(total - total % 3), added = [];
+    const normals = new Float32Array(3 * (position.count + total / 3));
+    const at = (k) => [position.getX(k), position.getY(k), position.getZ(k)];
+    for (let k = 0; k < corners.length; k += 3) {
+      let face = [0, 1, 2].map((j) => index ? index.getX(k + j) : k + j);
+      const last = face.findIndex((each) => !used[each]);
+      const [[a, b, c], [d, e, f], [g, h, i]] = face.map(at);
+      const x = (e - b) * (i - c) - (f - c) * (h - b), y = (f - c) * (g - a) - (d - a) * (i - c);
+      const z = (d - a) * (h - b) - (e - b) * (g - a), length = Math.hypot(x, y, z) || 1;
+      if (last < 0) {
+        added.push(face[2]);
+        face[2] = position.count + added.length - 1;
+      } else {
+        face = [face[(last + 1) % 3], face[(last + 2) % 3], face[last]];
+        used[face[2]] = 1;
+      }
+      normals.set([x / length, y / length, z / length], 3 * face[2]);
+      corners.set(face, k);
+    }
+    const count = position.count + added.length, points = new Float32Array(3 * count);
+    for (let k = 0; k < count; k++)
+      points.set(at(k < position.count ? k : added[k - position.count]), 3 * k);
+    const Attribute = position.constructor, found = new geometry.constructor();
+    found.setAttribute("position", new Attribute(points, 3));
+    found.setAttribute("normal", new Attribute(normals.subarray(0, 3 * count), 3));
+    found.setIndex(new Attribute(corners, 1));
+    found.boundingBox = geometry.boundingBox;
+    found.boundingSphere = geometry.boundingSphere;
+    return found;
+  };
+  const facets = new WeakMap();
+  const facetsOf = (geometry) => {
+    if (!facets.has(geometry)) facets.set(geometry, faceted(geometry));
+    return facets.get(geometry);
+  };
   const levels = new WeakMap();
   // Copies, colours that vary and shaders of others stay as they are.
   const isPlain = (mesh) => {
@@ -154,40 +193,40 @@ COARSE_WHILE_MOVING = (
       && !Object.hasOwn(material, "onBeforeCompile") && geometry.attributes.normal
       && mesh.instancesCount === undefined && !mesh.isInstancedMesh && !mesh.isSkinnedMesh;
   };
-  const coarserFor = (mesh, camera, height) => {
-    const {geometry} = mesh, {position} = geometry.attributes;
-    if (!((geometry.index ?? position).count / 3 > LIGHT)) return geometry;
+  const isMoving = (camera) => {
+    const state = stateOfPicture();
+    return state?.viewport.dpr === MOVING && state.camera === camera;
+  };
+  // The power of two, or of its root, that divides the diagonal of a shape into cells.
+  const levelOf = (mesh, camera, height) => {
+    const {geometry} = mesh;
     if (!geometry.boundingSphere) geometry.computeBoundingSphere();
     if (!geometry.boundingBox) geometry.computeBoundingBox();
     const {center, radius} = geometry.boundingSphere, {min, max} = geometry.boundingBox;
     const scale = mesh.matrixWorld.getMaxScaleOnAxis();
     const away = center.clone().applyMatrix4(mesh.matrixWorld).distanceTo(camera.position) - scale * radius;
     const pixel = 2 * Math.max(away, camera.near) * Math.tan(0.5 * camera.fov * Math.PI / 180) / height;
-    const diagonal = min.distanceTo(max), level = Math.ceil(Math.log2(scale * diagonal / (CELL * pixel)));
-    if (!(level <= LEVELS)) return geometry;
-    if (!levels.has(geometry)) levels.set(geometry, []);
-    const found = levels.get(geometry), k = Math.max(level, 1);
-    return found[k] ??= coarser(geometry, diagonal / 2 ** k);
+    return Math.max(Math.ceil(2 * Math.log2(scale * min.distanceTo(max) / (CELL * pixel))), 2) / 2;
   };
-  // A matte surface takes a third of the time of one with gloss.
-  const MATTE = `
-    uniform vec3 diffuse;
-    uniform float opacity;
-    varying vec3 vViewPosition;
-    #ifndef FLAT_SHADED
-      varying vec3 vNormal;
-    #endif
+  const levelWhileMoving = (mesh, renderer, camera) =>
+    isMoving(camera) ? levelOf(mesh, camera, renderer.domElement.height) : Infinity;
+  const coarserFor = (mesh, camera, height) => {
+    const {geometry} = mesh;
+    if (!((geometry.index ?? geometry.attributes.position).count / 3 > LIGHT)) return geometry;
+    const level = levelOf(mesh, camera, height);
+    if (!(level <= LEVELS)) return geometry;
+    if (!levels.has(geometry)) levels.set(geometry, new Map());
+    const found = levels.get(geometry), {min, max} = geometry.boundingBox;
+    if (!found.has(level)) found.set(level, coarser(geometry, min.distanceTo(max) / 2 ** level));
+    return found.get(level);
+  };
+  // A matte surface takes a third of the time of one with gloss, and less where the light is that of its
+  // corners. The colours of corners are those of the screen, as pixels between them need no powers then.
+  const LIT = `
     #include <common>
     #include <lights_pars_begin>
-    void main() {
-      #ifdef FLAT_SHADED
-        vec3 n = normalize(cross(dFdx(vViewPosition), dFdy(vViewPosition)));
-      #else
-        vec3 n = normalize(vNormal);
-        #ifdef DOUBLE_SIDED
-          n *= gl_FrontFacing ? 1.0 : -1.0;
-        #endif
-      #endif
+    uniform vec3 diffuse;
+    vec3 lit(vec3 n) {
       vec3 light = ambientLightColor;
       #if NUM_DIR_LIGHTS > 0
         for (int k = 0; k < NUM_DIR_LIGHTS; k++)
@@ -197,14 +236,56 @@ COARSE_WHILE_MOVING = (
         for (int k = 0; k < NUM_HEMI_LIGHTS; k++)
           light += getHemisphereLightIrradiance(hemisphereLights[k], n);
       #endif
-      gl_FragColor = vec4(RECIPROCAL_PI * diffuse * light, opacity);
-      #include <colorspace_fragment>
+      vec3 linear = clamp(RECIPROCAL_PI * diffuse * light, 0.0, 1.0);
+      vec3 curved = 1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055;
+      return mix(curved, 12.92 * linear, vec3(lessThanEqual(linear, vec3(0.0031308))));
+    }`;
+  // Of a triangle in one colour it is that of its last corner.
+  const CORNERS = `${LIT}
+    #ifdef FLAT_SHADED
+      flat
+    #endif
+    varying vec3 vFront;
+    #ifdef DOUBLE_SIDED
+      #ifdef FLAT_SHADED
+        flat
+      #endif
+      varying vec3 vBack;
+    #endif
+    void main() {
+      gl_Position = projectionMatrix * (modelViewMatrix * vec4(position, 1.0));
+      vec3 n = normalize(normalMatrix * normal);
+      vFront = lit(n);
+      #ifdef DOUBLE_SIDED
+        vBack = lit(-n);
+      #endif
+    }`;
+  const BETWEEN = `
+    uniform float opacity;
+    #ifdef FLAT_SHADED
+      flat
+    #endif
+    varying vec3 vFront;
+    #ifdef DOUBLE_SIDED
+      #ifdef FLAT_SHADED
+        flat
+      #endif
+      varying vec3 vBack;
+    #endif
+    void main() {
+      gl_FragColor = vec4(vFront, opacity);
+      #ifdef DOUBLE_SIDED
+        if (!gl_FrontFacing) gl_FragColor.rgb = vBack;
+      #endif
     }`;
   const matte = new WeakMap();
   const matteOf = (material) => {
     if (!matte.has(material)) {
       const made = material.clone();
-      made.onBeforeCompile = (shader) => { shader.fragmentShader = MATTE; };
+      made.onBeforeCompile = (shader) => {
+        shader.vertexShader = CORNERS;
+        shader.fragmentShader = BETWEEN;
+      };
       made.customProgramCacheKey = () => "dynx-matte";
       matte.set(material, made);
     }
@@ -219,13 +300,13 @@ COARSE_WHILE_MOVING = (
   };
   let whole = [];
   const drawCoarsely = (renderer, scene, camera) => {
-    const state = stateOfPicture();
-    if (state?.viewport.dpr !== MOVING || state.camera !== camera) return;
+    if (!isMoving(camera)) return;
     scene.traverseVisible((mesh) => {
       const {geometry, material} = mesh;
       if (!mesh.isMesh || !isPlain(mesh)) return;
       whole.push([mesh, geometry, material]);
-      mesh.geometry = coarserFor(mesh, camera, renderer.domElement.height);
+      const coarse = coarserFor(mesh, camera, renderer.domElement.height);
+      mesh.geometry = material.flatShading ? facetsOf(coarse) : coarse;
       mesh.material = matteOf(material);
     });
   };

@@ -19,10 +19,10 @@ SHADOWS = (
   // Ghosts, which lie below the node /second, have no shadow, as in pictures.
   const CASTS = /^\\/(motion|robot|world)\\/(.*\\/)?(visual|shape)\\d+$/;
   const outlines = new WeakMap();
-  const outlined = (geometry) => {
+  const outlined = (geometry, cells) => {
     const given = geometry.attributes.position, index = geometry.index, count = given.count;
     geometry.computeBoundingBox();
-    const {min, max} = geometry.boundingBox, cell = min.distanceTo(max) / CELLS || 1;
+    const {min, max} = geometry.boundingBox, cell = min.distanceTo(max) / cells || 1;
     const number = new Map(), of = new Uint32Array(count), sums = [];
     for (let k = 0; k < count; k++) {
       const x = given.getX(k), y = given.getY(k), z = given.getZ(k);
@@ -59,7 +59,7 @@ SHADOWS = (
     shadow.frustumCulled = false;
     shadow.raycast = () => {};
   };
-  const castShadows = () => {
+  const castShadows = (renderer, camera) => {
     const nodes = window.__viserMutable.nodeRefFromName, world = nodes[""], ground = nodes["/ground"];
     if (shadow) shadow.visible = false;
     if (!world || !ground?.visible) return;
@@ -77,11 +77,15 @@ SHADOWS = (
     if (!meshes.length) return;
     if (!shadow) addShadow(meshes[0]);
     if (shadow.parent !== world) world.add(shadow);
-    const present = meshes.map((each) => each.geometry.uuid).join();
-    const of = meshes.map(({geometry}) => {
-      if (!outlines.has(geometry)) outlines.set(geometry, outlined(geometry));
-      return outlines.get(geometry);
+    const of = meshes.map((mesh) => {
+      const {geometry} = mesh, level = levelWhileMoving(mesh, renderer, camera);
+      const cells = Math.min(2 ** Math.round(level), CELLS);
+      if (!outlines.has(geometry)) outlines.set(geometry, new Map());
+      const found = outlines.get(geometry);
+      if (!found.has(cells)) found.set(cells, outlined(geometry, cells));
+      return found.get(cells);
     });
+    const present = meshes.map((each, k) => [each.geometry.uuid, of[k].points.length]).join();
     if (present !== casting) {
       casting = present;
       let first = 0;
