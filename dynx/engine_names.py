@@ -276,6 +276,7 @@ KEYWORDS = {
     "joint_armature": "armature rotor_inertia",
     "joint_damping": "damping",
     "joint_friction": "dry_friction frictionloss coulomb",
+    "joint_springs": "springs joint_stiffness spring_stiffness springref spring_reference",
     "kd": "kv derivative_gain damping d velocity_gain d_gain",
     "ki": "integral_gain i i_gain",
     "kp": "stiffness proportional_gain p position_gain p_gain",

@@ -48,9 +48,10 @@ class Backend(QuantityCalls):
 
     `point` (3,) [m], in the frame's axes, moves the origin of the first two.
 
-    `joint_dynamics=True` adds the armature, viscous damping and Coulomb friction of the joints, which every
-    backend computes alike: ``armature * a + damping * v + friction * sign(v)`` to the torque, armature to the
-    diagonal of the mass matrix. By default only the rigid bodies count.
+    `joint_dynamics=True` adds the armature, viscous damping, Coulomb friction and springs of the joints,
+    which every backend computes alike: ``armature * a + damping * v + friction * sign(v) + stiffness * (q -
+    spring_reference)`` to the torque, armature to the diagonal of the mass matrix, the energy of the springs
+    to the potential energy. By default only the rigid bodies count.
 
     `external_forces` maps frame names to wrenches (..., 6), force [N] then moment [N m], that act on the
     robot; `force_reference` names their point and axes as `reference` does for a Jacobian.
@@ -291,8 +292,8 @@ class Backend(QuantityCalls):
         if external_forces is not None:
             tau = tau - self._force_torque(q, tau, external_forces, force_reference)
         if joint_dynamics:
-            v, a = self._checked_v(v), self._checked_v(a, "a")
-            tau = tau + self._joint_terms.friction_torque(v) + self._joint_terms.armature_torque(a)
+            q, v, a = self._checked_q(q), self._checked_v(v), self._checked_v(a, "a")
+            tau = tau + self._joint_terms.passive_torque(q, v) + self._joint_terms.armature_torque(a)
         return tau
 
     def forward_dynamics(
@@ -322,7 +323,7 @@ class Backend(QuantityCalls):
         if external_forces is not None:
             tau = tau + self._force_torque(q, tau, external_forces, force_reference)
         if joint_dynamics:
-            tau = tau - self._joint_terms.friction_torque(v)
+            tau = tau - self._joint_terms.passive_torque(q, v)
         if not (joint_dynamics and self._joint_terms.has_armature):
             return self._evaluate("forward_dynamics", (q, v, tau))
         M = self.mass_matrix(q, joint_dynamics=joint_dynamics)
@@ -357,7 +358,9 @@ class Backend(QuantityCalls):
         tau = self._evaluate("bias_torque", (q, v))
         if external_forces is not None:
             tau = tau - self._force_torque(q, tau, external_forces, force_reference)
-        return tau + self._joint_terms.friction_torque(self._checked_v(v)) if joint_dynamics else tau
+        if joint_dynamics:
+            tau = tau + self._joint_terms.passive_torque(self._checked_q(q), self._checked_v(v))
+        return tau
 
     def gravity_torque(self, q: ArrayLike) -> Floats:
         """Return g (..., nv) [N m]: `inverse_dynamics` at rest, the gradient of the potential energy.
@@ -404,8 +407,8 @@ class Backend(QuantityCalls):
         in the reference ``local``. `frame` names another frame for all, whose point and axes `reference`
         chooses as for a Jacobian. The component along the axis of a joint is its torque of
         `inverse_dynamics`; with mimic joints, a torque is the sum of these of the driver and, times their
-        multipliers, of its followers. What a joint's damping, friction and armature need is not part of it:
-        they act on the side of the motor.
+        multipliers, of its followers. What a joint's damping, friction, armature and spring need is not part
+        of it: they act on the side of the motor.
 
         Featherstone 2008, table 5.1. Elsewhere: Pinocchio `computeSupportedForceByFrame`, Drake
         `get_reaction_forces_output_port`, MuJoCo `cfrc_int` (of each body, about the centre of mass of the
@@ -476,13 +479,16 @@ class Backend(QuantityCalls):
             energy = energy + 0.5 * np.sum(v * self._joint_terms.armature_torque(v), axis=-1)
         return energy
 
-    def potential_energy(self, q: ArrayLike) -> Floats:
+    def potential_energy(self, q: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
         """Return the energy in the field of gravity (...,) [J], which is zero for mass at the world's origin.
 
         Siciliano et al., section 7.1.2. Elsewhere: Pinocchio `computePotentialEnergy`, Drake
         `CalcPotentialEnergy`, MuJoCo `mj_energyPos`.
         """
-        return self._evaluate("potential_energy", (q,))
+        energy = self._evaluate("potential_energy", (q,))
+        if joint_dynamics is not False and checked_bool("joint_dynamics", joint_dynamics):
+            energy = energy + self._joint_terms.elastic_energy(self._checked_q(q))
+        return energy
 
     # -- terms that every engine shares -------------------------------------------------------
 

@@ -1,7 +1,8 @@
-"""Joint dynamics: damping, Coulomb friction and armature of the description, the same for every backend.
+"""Joint dynamics: damping, Coulomb friction, armature and springs of the description, the same for every
+backend.
 
-They add ``armature a + damping v + friction sign(v)`` to the torque of each moving joint. Those of a mimic
-joint act on its driver through its multiplier.
+They add ``armature a + damping v + friction sign(v) + stiffness (q - spring_reference)`` to the torque of
+each moving joint. Those of a mimic joint act on its driver through its multiplier.
 """
 
 from __future__ import annotations
@@ -12,12 +13,14 @@ from typing import Any
 import numpy as np
 
 from dynx.model import Model
+from dynx.model.elements import JointSprings
 from dynx.spatial.scalar import Floats
 
 
 class JointDynamicsTerms:
-    """The `<dynamics>` of all moving joints: `damping`, `friction` and `rotors`, the armature, in coordinates
-    of the tree, the rest in those of the model."""
+    """The joint dynamics of all moving joints: `damping`, `friction` and `rotors`, the armature, in
+    coordinates of the tree, with zeros for a floating base, `stiffness` (n,) without; the rest in those of
+    the model."""
 
     def __init__(self, model: Model) -> None:
         moving = [joint.dynamics for joint in model.joints if joint.moves]
@@ -27,6 +30,13 @@ class JointDynamicsTerms:
         self.rotors = np.array(base + [d.armature for d in moving])
         coupling = model.mechanism.coupling
         self._to_tree = None if coupling is None else coupling.matrix()
+        self._tree_q = model.mechanism.tree_q
+        self.stiffness = np.array([d.stiffness for d in moving])
+        self._references = np.array([d.spring_reference for d in moving])
+        self.springs: JointSprings | None = None
+        """Springs of the model's coordinates; None if no joint has one."""
+        if self.stiffness.any():
+            self.springs = model.mechanism.springs(self.stiffness, self._references)
         self.has_armature = bool(np.any(self.rotors != 0.0))
 
     @cached_property
@@ -40,6 +50,16 @@ class JointDynamicsTerms:
         """Return the torque (..., nv) of damping and Coulomb friction at velocity v (..., nv)."""
         tree = self._in_tree(v)
         return self._in_model(self.damping * tree + self.friction * np.sign(tree))
+
+    def passive_torque(self, q: Any, v: Any) -> Floats:
+        """Return the torque (..., nv) that overcomes damping, Coulomb friction and springs."""
+        friction = self.friction_torque(v)
+        return friction if self.springs is None else np.asarray(friction - self.springs.torque(q))
+
+    def elastic_energy(self, q: Any) -> Floats:
+        """Return the energy of the springs (...,) at q (..., nq) [J]."""
+        joints = self._tree_q(q)[..., -len(self.stiffness) :] if len(self.stiffness) else np.zeros(0)
+        return np.asarray(0.5 * np.sum(self.stiffness * (joints - self._references) ** 2, axis=-1))
 
     def armature_torque(self, a: Any) -> Floats:
         """Return the torque (..., nv) of the armature at acceleration a (..., nv)."""

@@ -47,7 +47,8 @@ def parametric(
     - `payload`: ten inertial parameters of a body fixed to this frame, about its origin and in its axes;
       zeros by default
     - `point_payload`: mass and position of a point mass fixed to this frame, in its axes
-    - `joint_dynamics`: damping, dry friction and armature of every moving joint
+    - `joint_dynamics`: damping, dry friction and armature of every moving joint, and their springs in a robot
+      that has any
 
     A batch is split over at most `threads` threads; None stands for one per processor. Raises
     UnknownNameError for an unknown link or frame, ArgumentError for a link named twice.
@@ -72,7 +73,7 @@ class ParametricDynamics:
     `parameters` (..., n) in the order of ``self.parameters.names``; the default is the model's own
     parameters. Mass and inertia may have any values, even physically impossible ones. If joint dynamics are
     parameters, they are included in every result: the torque is that of the rigid bodies, plus ``armature a +
-    damping v + friction sign(v)`` of every joint, with sign(0) = 0.
+    damping v + friction sign(v) + stiffness (q - spring_reference)`` of every joint, with sign(0) = 0.
 
     Several threads may share an object; pickling keeps the model and the options. Raises errors of
     `dynx.errors` only.
@@ -111,7 +112,7 @@ class ParametricDynamics:
 
     @property
     def has_joint_dynamics(self) -> bool:
-        """True if damping, dry friction and armature of the joints are parameters."""
+        """True if damping, dry friction, armature and springs of the joints are parameters."""
         return self.parameters.joint_dynamics
 
     def dry_friction(self, parameters: Floats) -> Floats:
@@ -124,11 +125,13 @@ class ParametricDynamics:
     ) -> tuple[Array, Array, JointCoefficients | None]:
         """Return M with armature, r and the coefficients of one sample, for arrays of symbols in a trace.
 
-        The acceleration solves M a = r minus the torque of damping and dry friction. The coefficients are
-        None if they are no parameters.
+        The acceleration solves M a = r minus the torque of damping and dry friction; r has the torque of
+        springs. The coefficients are None if they are no parameters.
         """
         mechanism, joints = self._with(parameters), self.parameters.joints(parameters)
         bias = _inverse_dynamics(mechanism, None, q, v, np.zeros(len(v)))
+        if joints is not None and joints.springs is not None:
+            tau = tau + joints.springs.torque(q)
         return _mass_matrix(mechanism, joints, q), tau - bias, joints
 
     def root(self, parameters: Array) -> RigidInertia:
@@ -187,8 +190,10 @@ def _inverse_dynamics(
     tau = reduce_columns(mechanism, rnea.inverse_dynamics(mechanism, *tree))
     if joints is not None:
         moving = slice(6 if mechanism.floating else 0, None)
-        damping, friction, armature = (each[moving] for each in joints)
+        damping, friction, armature = (each[moving] for each in joints[:3])
         tau[moving] = tau[moving] + damping * v[moving] + friction * sign(v[moving]) + armature * a[moving]
+        if joints.springs is not None:
+            tau[moving] = tau[moving] - joints.springs.torque(q)[moving]
     return tau
 
 

@@ -189,10 +189,10 @@ class Controller(ABC, Generic[ControllerState]):
 class ModelBased(Controller[ControllerState]):
     """A controller that evaluates the dynamics of its model with a backend.
 
-    With `joint_dynamics` it knows the damping, dry friction and armature of the description, as quantities of
-    backends do with the option of that name; by default it computes with rigid bodies. Dry friction is
-    overcome along the velocity of the setpoint, which moves joints that stick and cannot make them unstable.
-    It commands every coordinate, so a floating base, which has no motor, is refused.
+    With `joint_dynamics` it knows the damping, dry friction, armature and springs of the description, as
+    quantities of backends do with the option of that name; by default it computes with rigid bodies. Dry
+    friction is overcome along the velocity of the setpoint, which moves joints that stick and cannot make
+    them unstable. It commands every coordinate, so a floating base, which has no motor, is refused.
     """
 
     model: Model
@@ -224,15 +224,16 @@ class ModelBased(Controller[ControllerState]):
         return super().name + (", joint dynamics known" if self.joint_dynamics else "")
 
     def with_joint_dynamics(
-        self, tau: Array, v: Array, a: Array, v_wanted: Array, h: Array | float = 0.0
+        self, tau: Array, q: Array, v: Array, a: Array, v_wanted: Array, h: Array | float = 0.0
     ) -> Array:
-        """Return a torque (nv,) plus that of armature and damping at velocity `v` and acceleration `a`, and
-        of dry friction along `v_wanted`. Damping is that after a step of `h` [s]."""
+        """Return a torque (nv,) plus that of springs at q, of armature and damping at velocity `v` and
+        acceleration `a`, and of dry friction along `v_wanted`. Damping is that after a step of `h` [s]."""
         joints = self.joints
         if joints is None:
             return tau
         dry = joints.friction * sign(v_wanted)
-        return np.asarray(tau + joints.armature * a + joints.damping * (v + h * a) + dry)
+        total = tau + joints.armature * a + joints.damping * (v + h * a) + dry
+        return np.asarray(total if joints.springs is None else total - joints.springs.torque(q))
 
     @checks_types
     def on(self: Self, engine: str | Backend) -> Self:
@@ -336,7 +337,7 @@ def known_joints(model: Model) -> JointCoefficients | None:
     """Return the coefficients (nv,) of a description for the coordinates of the model; None if all are 0."""
     parameters = Parameters(model, joint_dynamics=True)
     found = parameters.joints(np.array(parameters.defaults))
-    return found if found is not None and any(each.any() for each in found) else None
+    return found if found is not None and found.present else None
 
 
 def engine_of(model: Model, engine: str | Backend) -> Backend:

@@ -55,7 +55,7 @@ class ComputedTorque(ModelBased[None], pure=True):
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         _, q, v = measurement
         a = commanded_acceleration(q, v, *setpoint, self.kp, self.kd)
-        return self.with_joint_dynamics(self.dynamics.inverse_dynamics(q, v, a), v, a, setpoint.v), None
+        return self.with_joint_dynamics(self.dynamics.inverse_dynamics(q, v, a), q, v, a, setpoint.v), None
 
 
 def commanded_acceleration(
@@ -103,7 +103,7 @@ class DiscreteComputedTorque(ModelBased[None], pure=True):
         _, q, v = measurement
         dt = self.control_dt
         a, tau_of = one_step_acceleration(q, v, setpoint.q, dt), self.dynamics.inverse_dynamics
-        return self.with_joint_dynamics(tau_of(q, v, a), v, a, (setpoint.q - q) / dt, dt), None
+        return self.with_joint_dynamics(tau_of(q, v, a), q, v, a, (setpoint.q - q) / dt, dt), None
 
 
 def one_step_acceleration(q: Array, v: Array, q_next: Array, dt: Array | float) -> Array:

@@ -181,8 +181,8 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
     """PD control with gravity compensation, so that there is no error at rest.
 
     Globally asymptotically stable for a constant setpoint (Takegaki and Arimoto 1981; Siciliano et al.,
-    Robotics, section 8.5.1). With `joint_dynamics` it overcomes damping and friction at the setpoint's
-    velocity.
+    Robotics, section 8.5.1). With `joint_dynamics` it overcomes springs as it does gravity, and damping and
+    friction at the setpoint's velocity.
     """
 
     kp: Floats = gain("N m/rad or N/m")
@@ -204,7 +204,7 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
     @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         weight = self.dynamics.gravity_torque(measurement.q)
-        weight = self.with_joint_dynamics(weight, setpoint.v, 0.0 * setpoint.a, setpoint.v)
+        weight = self.with_joint_dynamics(weight, measurement.q, setpoint.v, 0.0 * setpoint.a, setpoint.v)
         return weight + pd_torque(
             measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd
         ), None
@@ -237,5 +237,5 @@ class FeedForward(ModelBased[None], pure=True):
     @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         tau = self.dynamics.inverse_dynamics(*setpoint)
-        tau = self.with_joint_dynamics(tau, setpoint.v, setpoint.a, setpoint.v)
+        tau = self.with_joint_dynamics(tau, setpoint.q, setpoint.v, setpoint.a, setpoint.v)
         return tau + pd_torque(measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd), None

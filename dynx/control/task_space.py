@@ -103,7 +103,7 @@ class Impedance(TaskSpace[None], pure=True):
         error = self._error(measurement, setpoint)
         wrench = self.stiffness * error.pose + self.damping * error.twist
         weight = self.dynamics.gravity_torque(measurement.q)
-        weight = self.with_joint_dynamics(weight, setpoint.v, 0.0 * setpoint.a, setpoint.v)
+        weight = self.with_joint_dynamics(weight, measurement.q, setpoint.v, 0.0 * setpoint.a, setpoint.v)
         return weight + error.jacobian.T @ wrench - self.joint_damping * measurement.v, None
 
 
@@ -170,4 +170,4 @@ class OperationalSpace(TaskSpace[None], pure=True):
             + inverse
             @ solve_columns(J @ inverse + self.damping**2 * np.eye(6), (left - J @ posture)[:, None])[:, 0]
         )
-        return self.with_joint_dynamics(dynamics.inverse_dynamics(q, v, a), v, a, setpoint.v), None
+        return self.with_joint_dynamics(dynamics.inverse_dynamics(q, v, a), q, v, a, setpoint.v), None

@@ -63,14 +63,15 @@ class TaskEnvironment(Env[Any, Any]):
         joint_damping: bool = True,
         joint_friction: bool = True,
         joint_armature: bool = True,
+        joint_springs: bool = True,
         joint_limits: bool = True,
     ) -> None:
         """`engine` is by default the first of ``task.engines()``; pictures have `width` x `height` pixels.
 
         Each episode draws the parameters that `randomize` names; ``info["parameters"]`` of `reset` has their
-        values. Joints have the damping, dry friction, armature and limits of their description, unless one of
-        these options is False. Raises ArgumentError for an option that is not valid, NotInstalledError for an
-        engine that is not installed, and the errors of `Randomization` and of its parameters.
+        values. Joints have the joint dynamics and limits of their description, unless one of these options is
+        False. Raises ArgumentError for an option that is not valid, NotInstalledError for an engine that is
+        not installed, and the errors of `Randomization` and of its parameters.
         """
         if not isinstance(task, Task):
             raise ArgumentError(f"task is of type {type(task).__name__}; wanted a dynx.envs.Task")
@@ -91,7 +92,7 @@ class TaskEnvironment(Env[Any, Any]):
         self._phase = "before reset"
         self._shown_at = -np.inf
         drawn = None if randomize is None else Randomization.read(randomize)
-        joints = JointOptions(joint_damping, joint_friction, joint_armature, joint_limits)
+        joints = JointOptions(joint_damping, joint_friction, joint_armature, joint_springs, joint_limits)
         self._episodes: Episodes | None = task.open(self.engine, joints)
         self._variation: Variation | None = None
         if drawn is not None:

@@ -110,6 +110,7 @@ def make_environment(
     joint_damping: bool = True,
     joint_friction: bool = True,
     joint_armature: bool = True,
+    joint_springs: bool = True,
     joint_limits: bool = True,
     **options: Any,
 ) -> TaskEnvironment:
@@ -130,6 +131,7 @@ def make_environment(
         joint_damping=joint_damping,
         joint_friction=joint_friction,
         joint_armature=joint_armature,
+        joint_springs=joint_springs,
         joint_limits=joint_limits,
     )
 
@@ -149,6 +151,7 @@ def make_vector_environment(
     joint_damping: bool = True,
     joint_friction: bool = True,
     joint_armature: bool = True,
+    joint_springs: bool = True,
     joint_limits: bool = True,
     **options: Any,
 ) -> RobotVectorEnvironment:
@@ -180,6 +183,7 @@ def make_vector_environment(
         joint_damping=joint_damping,
         joint_friction=joint_friction,
         joint_armature=joint_armature,
+        joint_springs=joint_springs,
         joint_limits=joint_limits,
     )
 

@@ -308,7 +308,7 @@ class EngineFriction(StepFriction):
 
         law = FrictionLaw.of(task.model, joints.friction)
         super().__init__(task, law.joints)
-        self._dynamics, self._damping = dynamics, joints.damping
+        self._dynamics, self._damping, self._springs = dynamics, joints.damping, joints.springs
         damping = joints.damping if self.damps_implicitly else None
         self._solver = ImplicitJoints(
             law, joints.friction, task.step_dt, damping=damping, armature=joints.armature
@@ -316,15 +316,17 @@ class EngineFriction(StepFriction):
 
     def solve(self, q: Floats, v: Floats, tau: Floats) -> tuple[Floats, Floats]:
         M, bias = self._dynamics.mass_matrix_and_bias(q, v)
-        a, moves = self._solver.step(M, bias, self._slowed(tau, v), v)
+        a, moves = self._solver.step(M, bias, self._slowed(tau, q, v), v)
         after = v + self._task.step_dt * a
         return a, np.sign(after[self._joints]) * moves[self._joints]
 
     def held(self, q: Floats, v: Floats, tau: Floats, start: Floats, modes: Floats) -> Floats:
         M, bias = self._dynamics.mass_matrix_and_bias(q, v)
-        return self._solver.with_modes(M, bias, self._slowed(tau, v), start, modes)
+        return self._solver.with_modes(M, bias, self._slowed(tau, q, v), start, modes)
 
-    def _slowed(self, tau: Floats, v: Floats) -> Floats:
+    def _slowed(self, tau: Floats, q: Floats, v: Floats) -> Floats:
+        if self._springs is not None:
+            tau = tau + self._springs.torque(q)
         return tau if self.damps_implicitly else tau - self._damping * v
 
 

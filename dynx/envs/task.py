@@ -28,6 +28,7 @@ from dynx.model import Model
 from dynx.model.numbers import MAX_MAGNITUDE, is_real
 from dynx.option_names import right_name
 from dynx.rbd.integration import Accelerate, ExplicitEuler, RungeKutta4, SemiImplicitEuler
+from dynx.rbd.parameters import SPRING
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array
 from dynx.steppers.registry import WITHOUT_CONTACTS, world_names
@@ -61,6 +62,8 @@ class JointOptions:
     """Dry friction."""
     joint_armature: bool = True
     """Rotor inertia."""
+    joint_springs: bool = True
+    """Springs."""
     joint_limits: bool = True
     """Stops at the position limits."""
 
@@ -68,8 +71,9 @@ class JointOptions:
         checked_switches(**vars(self))
 
     def has(self, coefficient: str) -> bool:
-        """Check whether joints have a coefficient of the description: damping, friction or armature."""
-        return bool(getattr(self, f"joint_{coefficient}"))
+        """Check whether joints have a coefficient of the description: damping, friction, armature, or one of
+        their springs."""
+        return bool(getattr(self, "joint_springs" if coefficient in SPRING else f"joint_{coefficient}"))
 
     @property
     def switched_off(self) -> dict[str, bool]:
@@ -231,7 +235,7 @@ SCHEMES: dict[str, Callable[[Model, float], Any]] = {
 class RobotTask(Task):
     """A task of one robot without contacts, whose dynamics a backend of dynx evaluates.
 
-    The robot that moves has the damping, dry friction, armature and limits of its description, unless options
+    The robot that moves has joint dynamics and limits of its description, unless options
     of the environment switch them off; what the methods evaluate is that of rigid bodies, and
     ``robot.joints`` has the coefficients.
 

@@ -18,7 +18,7 @@ from dynx.envs.task import DESCRIBED, JointOptions, RobotTask
 from dynx.errors import UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model import Model
 from dynx.model.elements import JointCoefficients
-from dynx.rbd.parameters import JOINT, POINT, Parameters
+from dynx.rbd.parameters import JOINT, POINT, SPRING, Parameters
 from dynx.spatial.scalar import Array, Floats
 from dynx.steppers.layout import stop_positions
 
@@ -72,7 +72,7 @@ class VariedRobot:
         described = any(
             joints.has(name) and getattr(joint.dynamics, name) != 0.0
             for joint in model.joints
-            for name in JOINT
+            for name in JOINT + SPRING
             if joint.moves
         )
         self.parameters = Parameters(
@@ -95,10 +95,11 @@ class VariedRobot:
 
     def _sources_of_joints(self, joints: JointOptions) -> list[int | float]:
         """Return the source of each coefficient of the joints, in the order of the parameters."""
-        columns, names = {name: self._columns(f"joint_{name}") for name in JOINT}, self._model.joint_names
+        of_joint, names = self.parameters.of_joint, self._model.joint_names
+        columns = {name: self._columns(f"joint_{name}") for name in of_joint}
         found: list[int | float] = []
         for joint in self._model.joints:
-            for name in JOINT if joint.moves else ():
+            for name in of_joint if joint.moves else ():
                 # One value for all joints is that of the joints with a coordinate, not of those that mimic.
                 whole = columns[name].get(None) if joint.name in names else None
                 column = columns[name].get(joint.name, whole)
@@ -110,7 +111,7 @@ class VariedRobot:
     def nominal_joints(self) -> JointCoefficients | None:
         """Coefficients (nv,) of the coordinates with what is drawn left out; None if all are 0."""
         joints = self.parameters.joints(self.values(np.zeros(len(self.drawn_parameters))))
-        return joints if joints is not None and any(each.any() for each in joints) else None
+        return joints if joints is not None and joints.present else None
 
     @property
     def dry_joints(self) -> Floats:

@@ -84,6 +84,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         joint_damping: bool = True,
         joint_friction: bool = True,
         joint_armature: bool = True,
+        joint_springs: bool = True,
         joint_limits: bool = True,
     ) -> None:
         """Options are those of `TaskEnvironment`.
@@ -113,7 +114,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         self._kinds = "iu" if self._discrete else "fiu"
         self._variation: Variation | None = None
         drawn = None if randomize is None else Randomization.read(randomize)
-        joints = JointOptions(joint_damping, joint_friction, joint_armature, joint_limits)
+        joints = JointOptions(joint_damping, joint_friction, joint_armature, joint_springs, joint_limits)
         varied = VariedRobot(task, drawn, joints)
         if drawn is not None:
             spaces_of_one = task.observation_space, task.action_space

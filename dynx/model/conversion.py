@@ -275,7 +275,7 @@ def _joint_differences(mine: Joint, theirs: Joint, size: float) -> Iterator[str]
         yield "axis"
     for name in ("dynamics", "mimic"):
         if getattr(mine, name) != getattr(theirs, name):
-            yield {"dynamics": "damping, friction or armature", "mimic": "coupling"}[name]
+            yield {"dynamics": "damping, friction, armature or spring", "mimic": "coupling"}[name]
     if (mine.limits.velocity, mine.limits.effort) != (theirs.limits.velocity, theirs.limits.effort):
         yield "limit of velocity or effort"
     if _kind(mine) != "continuous":

@@ -213,19 +213,51 @@ class Limits:
 
 @dataclass(frozen=True)
 class JointDynamics:
-    """Viscous damping, Coulomb friction and armature (reflected rotor inertia) of a joint (see `Backend`)."""
+    """Viscous damping, Coulomb friction, armature (reflected rotor inertia) and spring of a joint (see
+    `Backend`).
+
+    The spring pulls with ``-stiffness (q - spring_reference)``; `stiffness` is in N m/rad or N/m,
+    `spring_reference` in rad or m, and 0 for a joint without a spring, where it means nothing.
+    """
 
     damping: float = 0.0
     friction: float = 0.0
     armature: float = 0.0
+    stiffness: float = 0.0
+    spring_reference: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.stiffness == 0.0:
+            object.__setattr__(self, "spring_reference", 0.0)
+
+
+class JointSprings(NamedTuple):
+    """Springs (..., nv) of the model's coordinates, for any scalar; 0 for a floating base."""
+
+    stiffness: Array
+    preload: Array
+    """Torque with which the springs pull at position 0 [N m or N]."""
+
+    def torque(self, q: Array) -> Array:
+        """Return the torque (..., nv) with which the springs pull at q (..., nq)."""
+        # The positions of the joints are the last ones; those of a base have no stiffness.
+        return np.asarray(self.preload - self.stiffness * q[..., q.shape[-1] - self.stiffness.shape[-1] :])
 
 
 class JointCoefficients(NamedTuple):
-    """Damping, dry friction and armature (..., nv) of the model's coordinates, 0 for a floating base."""
+    """Damping, dry friction, armature and springs (..., nv) of the model's coordinates, 0 for a floating
+    base."""
 
     damping: Array
     friction: Array
     armature: Array
+    springs: JointSprings | None = None
+    """None for a robot without springs."""
+
+    @property
+    def present(self) -> bool:
+        """True if a coefficient is not 0."""
+        return self.springs is not None or any(each.any() for each in self[:3])
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.model.elements import IDENTITY, Pose
+from dynx.model.elements import IDENTITY, JointSprings, Pose
 from dynx.model.tree import Tree
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
 from dynx.spatial.scalar import Array, Floats, sqrt
@@ -149,6 +149,19 @@ class Mechanism:
     def has_mass(self) -> bool:
         """True if any body has mass."""
         return any(inertia.mass != 0 for inertia in (self.root, *(b.inertia for b in self.bodies)))
+
+    def springs(self, stiffness: Array, reference: Array) -> JointSprings:
+        """Return the springs of the model's coordinates, from those of the tree (..., n), for any scalar.
+
+        That of a mimic joint acts on its driver through its multiplier.
+        """
+        preload = stiffness * reference
+        if self.coupling is not None:
+            S = self.coupling.matrix()[-len(self.coupling.index) :, -self.coupling.n_joints :]
+            preload = (preload - stiffness * np.array(self.coupling.offset)) @ S
+            stiffness = stiffness @ S**2
+        base = np.zeros((*stiffness.shape[:-1], 6 if self.floating else 0))
+        return JointSprings(*(np.concatenate([base, each], axis=-1) for each in (stiffness, preload)))
 
     @property
     def root_center(self) -> Array:

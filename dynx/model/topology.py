@@ -45,6 +45,8 @@ def _of_joint(joint: Joint) -> Iterator[tuple[str, float]]:
     yield "damping", dynamics.damping
     yield "friction", dynamics.friction
     yield "armature", dynamics.armature
+    yield "stiffness", dynamics.stiffness
+    yield "spring reference", dynamics.spring_reference
     if joint.mimic is not None:
         yield "multiplier", joint.mimic.multiplier
         yield "offset", joint.mimic.offset

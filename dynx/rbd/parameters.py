@@ -34,6 +34,9 @@ POINT = ("mass", "cx", "cy", "cz")
 JOINT = ("damping", "friction", "armature")
 """Parameters of a joint: [N m s] or [N s/m], [N m] or [N], [kg m^2] or [kg]."""
 
+SPRING = ("stiffness", "spring_reference")
+"""Parameters of a joint's spring: [N m/rad] or [N/m], [rad] or [m]."""
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -43,7 +46,8 @@ class Parameters:
     - `scaled`: a factor on mass and inertia of each of these links
     - `payload`: ten inertial parameters of a body fixed to this frame, about its origin and in its axes
     - `point_payload`: mass and position of a point mass fixed to this frame, in its axes
-    - `joint_dynamics`: damping, dry friction and armature of every moving joint
+    - `joint_dynamics`: damping, dry friction and armature of every moving joint, and their springs in a robot
+      that has any
 
     Raises UnknownNameError for an unknown link or frame, ArgumentError for a link named twice.
     """
@@ -83,7 +87,7 @@ class Parameters:
         if self.point_payload is not None:
             found += [(f"{self.point_payload}.point.{name}", 0.0) for name in POINT]
         for joint in self._moving if self.joint_dynamics else ():
-            found += [(f"{joint.name}.{name}", getattr(joint.dynamics, name)) for name in JOINT]
+            found += [(f"{joint.name}.{name}", getattr(joint.dynamics, name)) for name in self.of_joint]
         return tuple(found)
 
     @cached_property
@@ -109,6 +113,11 @@ class Parameters:
     @property
     def _moving(self) -> tuple[Joint, ...]:
         return tuple(joint for joint in self.model.joints if joint.moves)
+
+    @cached_property
+    def of_joint(self) -> tuple[str, ...]:
+        """Names of the parameters of a moving joint."""
+        return JOINT + SPRING if any(joint.dynamics.stiffness for joint in self._moving) else JOINT
 
     def remainder(self) -> Mechanism:
         """Return the mechanism without the links whose inertia is a parameter."""
@@ -152,18 +161,22 @@ class Parameters:
         """Return the coefficients of the coordinates for values (..., n); None if they are no parameters."""
         if not self.joint_dynamics:
             return None
-        count = len(self._moving)
-        rows = values[..., values.shape[-1] - len(JOINT) * count :]
+        count, n = len(self._moving), len(self.of_joint)
+        rows = values[..., values.shape[-1] - n * count :]
         base = np.zeros((*rows.shape[:-1], 6 if self.model.floating else 0))
+        columns = [rows[..., k::n] for k in range(n)]
+        springs, spring = None, columns[len(JOINT) :]
+        if spring and (values.dtype == object or spring[0].any()):
+            springs = self.model.mechanism.springs(*spring)
         damping, friction, armature = (
-            np.concatenate([base, rows[..., k :: len(JOINT)]], axis=-1) for k in range(len(JOINT))
+            np.concatenate([base, each], axis=-1) for each in columns[: len(JOINT)]
         )
         coupling = self.model.mechanism.coupling
         if coupling is not None:
             # Each joint follows at most one coordinate, so S' diag(x) S is diagonal.
             S = coupling.matrix()
             damping, friction, armature = damping @ S**2, friction @ abs(S), armature @ S**2
-        return JointCoefficients(damping, friction, armature)
+        return JointCoefficients(damping, friction, armature, springs)
 
     def model_of(self, values: Floats) -> Model:
         """Return the robot with values (n,), for engines.
@@ -192,9 +205,9 @@ class Parameters:
         if not self.joint_dynamics:
             return replace(whole, links=links, geometry=geometry)
         moving = [joint.name for joint in self._moving]
-        laws = dict(zip(moving, given.joints.reshape(-1, len(JOINT)).tolist(), strict=True))
+        laws = dict(zip(moving, given.joints.reshape(-1, len(self.of_joint)).tolist(), strict=True))
         joints = tuple(
-            replace(joint, dynamics=JointDynamics(**dict(zip(JOINT, laws[joint.name], strict=True))))
+            replace(joint, dynamics=JointDynamics(**dict(zip(self.of_joint, laws[joint.name], strict=True))))
             if joint.name in laws
             else joint
             for joint in whole.joints

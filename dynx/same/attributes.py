@@ -34,6 +34,8 @@ Kind = Literal[
     "damping",
     "friction",
     "armature",
+    "stiffness",
+    "spring reference",
     "collision shapes",
     "visual shapes",
     "contact filter",
@@ -101,7 +103,11 @@ def _of_joint(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> Ite
         ("damping", mine.dynamics.damping, joint.dynamics.damping),
         ("friction", mine.dynamics.friction, joint.dynamics.friction),
         ("armature", mine.dynamics.armature, joint.dynamics.armature),
+        ("stiffness", mine.dynamics.stiffness, joint.dynamics.stiffness),
     ]
+    references = [dynamics.spring_reference for dynamics in (mine.dynamics, joint.dynamics)]
+    if mine.dynamics.stiffness and joint.dynamics.stiffness:
+        rows.append(("spring reference", references[0], each.sign * references[1]))
     for kind, first, second in rows:
         if differs(first, second, tolerance):
             yield Attribute(

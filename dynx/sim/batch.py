@@ -590,7 +590,7 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
     if rubbing:
         # The parameters have those of the description as defaults; they count once.
         own_joints = (name for name in COEFFICIENTS if getattr(scenario, name) is True and name not in varied)
-        stand_ins |= dict.fromkeys(own_joints, False)
+        stand_ins |= {"joint_springs": False, **dict.fromkeys(own_joints, False)}
     setup = Setup.of(replace(scenario, **stand_ins), ("joint_friction",) if rubbing else ())
     recorded = scenario.for_record()
     controller, moved, clock = setup.controller, setup.model, setup.clock

@@ -30,6 +30,7 @@ from dynx.sim.controller_checks import (
 )
 from dynx.sim.noise import Noise
 from dynx.sim.overshoot import largest_overshoot, overcompensated_friction
+from dynx.sim.plants.disturbances import notes_on_springs
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.plants.plant import Plant, is_own, plant_errors
 from dynx.sim.step import is_diverged, measure, torque_sum
@@ -414,6 +415,9 @@ class ClosedLoop:
             armature = self.plant.disturbances.armature.diagonal()
             overshoot = largest_overshoot(self.controller, record.q[0], control_dt, armature=armature)
             beyond = overcompensated_friction(self.controller, self.plant.disturbances.friction)
+            h = self.clock.dt / self.plant.substeps
+            for note in notes_on_springs(self.plant.disturbances, None, h, record.q[0]):
+                why += f"; {note}"
         if overshoot is not None:
             why += f"; {overshoot.hint('dt' if self.clock.steps_per_control == 1 else 'control_dt')}"
         if beyond is not None:

@@ -28,6 +28,7 @@ from dynx.control.base import Controller, chain_of, gains_of, rebind
 from dynx.control.content import attributes_of, content_of, fields_of, is_foreign
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
+from dynx.model.elements import JointSprings
 from dynx.model.numbers import is_real
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
 from dynx.rbd.integration import SemiImplicitEuler
@@ -74,7 +75,7 @@ SETPOINT = ("q_wanted", "v_wanted", "a_wanted")
 
 @dataclass(frozen=True)
 class ArrayDisturbances:
-    """Friction, armature and pushes of a plant, as array code.
+    """Friction, springs, armature and pushes of a plant, as array code.
 
     They mean the same as on floats (`dynx.sim.plants.disturbances`). Coefficients of joints that differ
     between rollouts are inputs of the step; all others are constants in it.
@@ -87,6 +88,7 @@ class ArrayDisturbances:
     varied: Mapping[str, int]
     """Number of joints with a coefficient that differs between rollouts, by the name of the coefficient."""
     pushes: tuple[ExternalForce, ...]
+    springs: JointSprings | None = None
 
     @classmethod
     def of(cls, model: Model, disturbances: Disturbances, varied: Mapping[str, Floats]) -> ArrayDisturbances:
@@ -94,7 +96,7 @@ class ArrayDisturbances:
         sizes = {name: rows.shape[1] for name, rows in varied.items()}
         # Each joint depends on at most one coordinate, so the armature matrix is diagonal.
         armature = disturbances.armature.diagonal().copy()
-        return cls(model, disturbances.friction, armature, sizes, disturbances.pushes)
+        return cls(model, disturbances.friction, armature, sizes, disturbances.pushes, disturbances.springs)
 
     def sizes(self, *, pushed: bool) -> dict[str, int]:
         """Return the inputs of the kernel for friction, armature and pushes, and their sizes."""
@@ -122,7 +124,10 @@ class ArrayDisturbances:
         *,
         pushed: bool,
     ) -> Array:
-        """Return `tau` minus the torque of friction with a slip speed plus the torque of the pushes (nv,)."""
+        """Return `tau` minus the torque of friction with a slip speed plus that of springs and pushes
+        (nv,)."""
+        if self.springs is not None:
+            tau = tau + self.springs.torque(q)
         friction, pushes = self.joint_friction, []
         if pushed:
             for push, wrench in zip(self.pushes, given["wrenches"].reshape(-1, WRENCH), strict=True):

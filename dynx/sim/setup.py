@@ -154,7 +154,7 @@ def require_duration(scenario: Scenario) -> None:
 
 
 def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:
-    """Return the friction, armature and pushes of a scenario on `moved`, the model of its plant."""
+    """Return the friction, springs, armature and pushes of a scenario on `moved`, the model of its plant."""
     return Disturbances(
         moved,
         scenario.joint_damping,
@@ -163,6 +163,7 @@ def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:
         scenario.joint_armature,
         scenario.all_pushes,
         scenario.dt / whole_number("substeps", scenario.substeps, 1, MAX_STEPS),
+        joint_springs=scenario.joint_springs,
     )
 
 

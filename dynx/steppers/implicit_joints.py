@@ -1,7 +1,7 @@
 """Damping, dry friction and armature of joints in one step of a robot, which `ImplicitJoints` solves.
 
-`OutsideJoints` are those of a robot in an engine that does not have them: a torque that the engine applies
-has their effect.
+`OutsideJoints` are those and the springs of a robot in an engine that does not have them: a torque that the
+engine applies has their effect.
 """
 
 from __future__ import annotations
@@ -191,11 +191,18 @@ class OutsideJoints:
         self._joints = list(law.joints)
         self.moves: Floats = np.ones(len(own.damping))
         """1 for the coordinates that moved in the last step, 0 for those that stuck (nv,)."""
+        self._springs = robot.springs if robot.stiffness is not in_engine.stiffness else None
+        self.only_springs = self._friction_only and not friction.any()
+        """True if the engine has all but the springs, whose torque depends on the configuration alone."""
         self.memory: tuple[Floats, Floats] | None = None
         """Velocity and torque (nv,) of the step before; None if there was no such step."""
 
     def torque(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         """Return what the engine is to apply (nv,) in a step from q, v in place of `tau` (nv,)."""
+        if self._springs is not None:
+            tau = tau + self._springs.torque(q)
+        if self.only_springs:
+            return tau
         M, bias = self._dynamics.mass_matrix_and_bias(q, v)
         if self.memory is not None and self._is_touched(q, v):
             before, applied = self.memory
@@ -208,10 +215,11 @@ class OutsideJoints:
             self.memory = v, total
         return total
 
-    def explicit_damping(self, v: Floats) -> Floats:
-        """Return the torque (nv,) of damping at velocity `v`, beside motors whose torque is not known before
-        the step."""
-        return (self._damping - self._solver.damping) * v
+    def explicit_torque(self, q: Floats, v: Floats) -> Floats:
+        """Return the torque (nv,) of springs at q and of damping at velocity `v`, beside motors whose torque
+        is not known before the step."""
+        damping = (self._damping - self._solver.damping) * v
+        return damping if self._springs is None else damping + self._springs.torque(q)
 
     def _is_touched(self, q: Floats, v: Floats) -> bool:
         """Check whether the engine may have forces in a step from q, v that only it knows."""

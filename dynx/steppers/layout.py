@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.model import Model
-from dynx.model.elements import Joint, JointCoefficients
+from dynx.model.elements import Joint, JointCoefficients, JointSprings
 from dynx.model.geometry import Shape
 from dynx.spatial.scalar import Floats
 from dynx.steppers.material import Material
@@ -79,18 +79,29 @@ class RobotLayout:
     """Coulomb friction (n,) of the joints [N m or N]."""
     armature: Floats
     """Armature (n,) of the joints [kg m^2 or kg]."""
+    stiffness: Floats
+    """Stiffness (n,) of the joints' springs [N m/rad or N/m]."""
+    spring_reference: Floats
+    """Positions (n,) at which the springs do not pull [rad or m]."""
+
+    @property
+    def springs(self) -> JointSprings | None:
+        """Springs of the model's coordinates; None if no joint has one."""
+        if not self.stiffness.any():
+            return None
+        return self.model.mechanism.springs(self.stiffness, self.spring_reference)
 
     def coefficients(self) -> JointCoefficients:
-        """Return damping, dry friction and armature (nv,) of the model's coordinates: those of a mimic joint
-        act on its driver through its multiplier."""
+        """Return the coefficients (nv,) of the model's coordinates: those of a mimic joint act on its driver
+        through its multiplier."""
         base = np.zeros(6 if self.model.floating else 0)
         tree = (np.concatenate([base, each]) for each in (self.damping, self.friction, self.armature))
         damping, friction, armature = tree
         coupling = self.model.mechanism.coupling
         if coupling is None:
-            return JointCoefficients(damping, friction, armature)
+            return JointCoefficients(damping, friction, armature, self.springs)
         S = coupling.matrix()
-        return JointCoefficients((S**2).T @ damping, abs(S).T @ friction, (S**2).T @ armature)
+        return JointCoefficients((S**2).T @ damping, abs(S).T @ friction, (S**2).T @ armature, self.springs)
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,7 +52,7 @@ class RobotStep:
         **options: Any,
     ) -> None:
         """`joints` are coefficients (nv,) of the model's coordinates; `add_load` is called wherever the
-        acceleration is evaluated; `options` are those of the integrator `adaptive`.
+        acceleration is evaluated, and so are springs; `options` are those of the integrator `adaptive`.
 
         Raises ArgumentError for invalid options, UnsupportedFeatureError for a floating base under `euler`.
         """
@@ -61,10 +61,12 @@ class RobotStep:
         self.scheme = SCHEMES[integrator](engine.model, h, **options)
         self.sticks = bool(joints.damping.any() or joints.friction.any())
         """True if damping or dry friction is solved for at the end of each step."""
-        self._h, self._add_load = h, add_load
+        self._h, self._add_load, self._springs = h, add_load, joints.springs
         self._armature = np.diag(joints.armature) if joints.armature.any() else None
         self._damping = joints.damping
-        self._is_free = not self.sticks and self._armature is None and add_load is None
+        self._is_free = not self.sticks and all(
+            each is None for each in (self._armature, add_load, self._springs)
+        )
         if self.sticks:
             law = FrictionLaw.of(engine.model, joints.friction)
             damping = joints.damping if isinstance(self.scheme, SemiImplicitEuler) else None
@@ -108,6 +110,8 @@ class RobotStep:
         return self._joints.step(*self.dynamics.mass_matrix_and_bias(q, v), tau, v)
 
     def _loaded(self, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
+        if self._springs is not None:
+            tau = tau + self._springs.torque(q)
         return tau if self._add_load is None else self._add_load(tau, q, v, t)
 
     def _step_in_modes(

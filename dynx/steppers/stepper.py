@@ -30,6 +30,7 @@ class Feature(Enum):
     DAMPING = "joint damping"
     DRY_FRICTION = "joint dry friction"
     ARMATURE = "joint armature"
+    SPRINGS = "joint springs"
     MIMICS = "mimic joints"
     CONSTRAINTS = "welds and point-to-point constraints"
     """`Layout.constraints`."""
@@ -121,9 +122,9 @@ class Stepper(ABC):
     def provides(cls, layout: Layout) -> frozenset[Feature]:
         """Return what the engine has for this scene.
 
-        The constructor gets a layout without damping, dry friction and armature of joints that the engine
-        does not have: `dynx.world.World` computes them outside of it. It refuses a scene that needs any other
-        feature which is missing.
+        The constructor gets a layout without damping, dry friction, armature and springs of joints that the
+        engine does not have: `dynx.world.World` computes them outside of it. It refuses a scene that needs
+        any other feature which is missing.
         """
 
     @classmethod

@@ -72,9 +72,10 @@ def violations(
     """List every limit of position, velocity and effort that the motion violates, for each joint at the time
     of its largest excess.
 
-    Effort is computed by inverse dynamics along the motion (including damping, friction and armature with
-    `joint_dynamics`) by `backend`, a name or a backend of the model. With a floating base inverse dynamics
-    assumes a wrench on the base that no actuator exerts, so the effort is that of a robot held by its base.
+    Effort is computed by inverse dynamics along the motion (including the joint dynamics of the description
+    with `joint_dynamics`) by `backend`, a name or a backend of the model. With a floating base inverse
+    dynamics assumes a wrench on the base that no actuator exerts, so the effort is that of a robot held by
+    its base.
     ``effort=False`` skips it. The motion is checked at 500 times, on both sides of each knot of the
     trajectory, and at more times around the largest excesses.
 

@@ -10,8 +10,8 @@ Limits of effort are linear in the same unknowns. TOPP-RA respects the limits at
 are checked in between, and the whole motion is slowed down uniformly until it respects them there too.
 
 Along a path q(s) inverse dynamics is tau = a(s) s'' + b(s) s'^2 + d(s) s' + c(s): a and b from the inertia, d
-from viscous damping, c from gravity and dry friction (Bobrow, Dubowsky and Gibson, Time-optimal control of
-robotic manipulators along specified paths, Int. J. Robotics Research 4(3), 1985).
+from viscous damping, c from gravity, springs and dry friction (Bobrow, Dubowsky and Gibson, Time-optimal
+control of robotic manipulators along specified paths, Int. J. Robotics Research 4(3), 1985).
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ class PathTorque(NamedTuple):
     viscous: Floats
     dry: Floats
     gravity: Floats
+    """Torque against gravity and springs."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class EffortLimits:
     limit: Floats
     """Largest torque or force of each coordinate (nv,) [N m or N]; infinity means no limit."""
     joint_dynamics: bool
-    """Whether damping, dry friction and armature of the description count."""
+    """Whether damping, dry friction, armature and springs of the description count."""
 
     @property
     def is_viscous(self) -> bool:
@@ -76,12 +77,14 @@ class EffortLimits:
         if not self.joint_dynamics:
             return PathTorque(a, b, rest, rest, gravity)
         # Viscous torque is linear in the speed, and dry friction depends on its sign alone.
-        once, twice = self._losses(q, slope, rest), self._losses(q, 2.0 * slope, rest)
-        armature = self._losses(q, rest, slope), self._losses(q, rest, curvature)
-        return PathTorque(a + armature[0], b + armature[1], twice - once, 2.0 * once - twice, gravity)
+        springs = self._losses(q, rest, rest)
+        once, twice = (self._losses(q, k * slope, rest) - springs for k in (1.0, 2.0))
+        armature = [self._losses(q, rest, each) - springs for each in (slope, curvature)]
+        held = gravity + springs
+        return PathTorque(a + armature[0], b + armature[1], twice - once, 2.0 * once - twice, held)
 
     def _losses(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Return the torque (n, nv) of damping, dry friction and armature."""
+        """Return the torque (n, nv) of damping, dry friction, armature and springs."""
         whole = self.engine.inverse_dynamics(q, v, a, joint_dynamics=True)
         return np.asarray(whole - self.engine.inverse_dynamics(q, v, a))
 
@@ -204,8 +207,8 @@ def time_optimal_path(
 
     `velocity` and `acceleration` are limits, one number or (nv,), positive and finite; the default of
     `velocity` is the limit of the `model`. `effort` limits the torques of inverse dynamics by `backend`: True
-    for the limits of the `model`, one number or (nv,) [N m or N], with damping, dry friction and armature of
-    the description if `joint_dynamics` is True; without it, `acceleration` has to be given. Limits are never
+    for the limits of the `model`, one number or (nv,) [N m or N], with the joint dynamics of the description
+    if `joint_dynamics` is True; without it, `acceleration` has to be given. Limits are never
     exceeded, and nearly always one is close to being reached (within 0.2 % on average for velocity and
     acceleration, over random waypoints). The acceleration jumps. The path is a cubic spline, which may
     overshoot the waypoints (`dynx.trajectory.check` checks position limits). Only for a fixed base.

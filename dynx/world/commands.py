@@ -81,7 +81,7 @@ class RobotLoads:
         engine's own that has an error."""
         ours, theirs = self._robot, self._in_engine
         limited = bool(np.isfinite([ours.lower, ours.upper]).any())
-        if self.joints is not None and (self._reached or limited):
+        if self.joints is not None and not self.joints.only_springs and (self._reached or limited):
             names = ("damping", "friction", "armature")
             outside = [name for name in names if (getattr(ours, name) != getattr(theirs, name)).any()]
             acts = "act" if outside[1:] else "acts"
@@ -97,10 +97,21 @@ class RobotLoads:
             Feature.DAMPING: theirs.damping.any(),
             Feature.DRY_FRICTION: theirs.friction.any(),
             Feature.ARMATURE: theirs.armature.any(),
+            Feature.SPRINGS: theirs.stiffness.any(),
         }
         for feature, error in engine.inexact.items():
             if present[feature]:
                 yield f"{feature.value} of {shown(self.name)} in {engine.name}: {error}"
+        yield from self.notes_on_springs()
+
+    def notes_on_springs(self) -> Iterator[str]:
+        """Yield one sentence for springs that are unstable at the start in steps of the engine."""
+        springs = self._robot.springs
+        if springs is not None:
+            from dynx.steppers.stiff_springs import notes_on_springs  # most robots have none
+
+            M = self.mass_matrix(self._robot.q)
+            yield from notes_on_springs(self.model, springs, M, self._h, robot=f"{self.name}/")
 
     @property
     def has_motors(self) -> bool:
@@ -185,7 +196,7 @@ class RobotLoads:
     ) -> Floats:
         """Return `torque` beside the engine's own motors, whose torque is known after the step only."""
         total = self._pushed(q, tau, forces)
-        return total if self.joints is None else total + self.joints.explicit_damping(v)
+        return total if self.joints is None else total + self.joints.explicit_torque(q, v)
 
     def refuse_engine_motors(self, motors: str) -> None:
         """Raise UnsupportedFeatureError for joint dynamics that the engine's own motors cannot have."""
@@ -390,6 +401,11 @@ class Commands:
         for loads in self._loads:
             yield from loads.notes(self._engine)
             yield from loads.target_notes
+
+    def notes_on_springs(self) -> Iterator[str]:
+        """Yield one sentence for each robot with springs that are unstable in steps of the engine."""
+        for loads in self._loads:
+            yield from loads.notes_on_springs()
 
     def last(self) -> LastLoads:
         """Return the loads of the last step."""

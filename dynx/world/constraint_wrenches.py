@@ -254,6 +254,8 @@ def _reaction(robot: RobotLayout, k: int, step: StepRecord) -> Floats:
         q, v, a, external_forces=step.contact_forces[k], force_reference="world"
     )
     tau = tau + joints.armature * a + joints.damping * (v_after if step.damps_at_end[k] else v)
+    if joints.springs is not None:
+        tau = tau - joints.springs.torque(q)
     for number, given in step.forces.torques:
         if number == k:
             tau = tau - given

@@ -30,6 +30,7 @@ def scene_to_mjcf(
     joint_damping: JointDynamics = True,
     joint_friction: JointDynamics = True,
     joint_armature: JointDynamics = True,
+    joint_springs: JointDynamics = True,
     **settings: object,
 ) -> str:
     """Return a scene as an MJCF document, complete in itself: the model of its world in MuJoCo.
@@ -55,6 +56,7 @@ def scene_to_mjcf(
         "joint_damping": joint_damping,
         "joint_friction": joint_friction,
         "joint_armature": joint_armature,
+        "joint_springs": joint_springs,
     }
     options = checked_options(dt, substeps, **switches)
     if "engine" in settings:

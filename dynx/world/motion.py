@@ -291,7 +291,9 @@ class Motion:
         begun = self._build()
         try:
             apply_state(begun, self._state_at_start)
-            causes = likely_causes(begun, self._state_at_start, self.engine, loads, self._dt / self._substeps)
+            h = self._dt / self._substeps
+            causes = likely_causes(begun, self._state_at_start, self.engine, loads, h)
+            causes = [*self._commands.notes_on_springs()] or causes
         finally:
             begun.close()
         return f"; likely cause: {'; '.join(causes)}" if causes else ""

@@ -1,4 +1,4 @@
-"""Preparation of a scene for an engine: shapes by owner, limits and damping by joint, anchors, filters."""
+"""Preparation of a scene for an engine: shapes by owner, limits and dynamics by joint, anchors, filters."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ SHORTEST_STEP = 1e-9
 
 
 JointDynamics = bool
-"""Whether joints have the damping, friction or armature of the robot's description: a world has no others."""
+"""Whether joints have the damping, friction, armature or springs of the robot's description: a world has no
+others."""
 
 
 def checked_options(dt: float, substeps: int, **switches: bool) -> dict[str, Any]:
@@ -61,13 +62,14 @@ def prepare(
     joint_damping: bool,
     joint_friction: bool,
     joint_armature: bool,
+    joint_springs: bool,
 ) -> Layout:
     """Return the layout of a scene.
 
     Raises DescriptionError for a fault in a collision shape or its mesh, EngineLimitError for more than
     `MAX_COLLIDERS` colliders.
     """
-    switches = joint_limits, joint_damping, joint_friction, joint_armature
+    switches = joint_limits, joint_damping, joint_friction, joint_armature, joint_springs
     robots = tuple(_robot(robot, scene.gravity, *switches) for robot in scene.robots)
     parts = _PartLookup(scene, robots)
     colliders = parts.colliders() if collisions else ()
@@ -90,6 +92,7 @@ def _robot(
     damping: bool,
     friction: bool,
     armature: bool,
+    springs: bool,
 ) -> RobotLayout:
     model = robot.model if robot.model.gravity == gravity else replace(robot.model, gravity=gravity)
     moving = [joint for joint in model.joints if joint.moves]
@@ -98,17 +101,13 @@ def _robot(
     if limits:
         for k, joint in enumerate(moving):
             lower[k], upper[k] = sorted((joint.limits.lower, joint.limits.upper))
-    return RobotLayout(
-        robot.name,
-        model,
-        np.array(robot.q),
-        np.array(robot.v),
-        lower,
-        upper,
-        np.array([joint.dynamics.damping for joint in moving]) if damping else np.zeros(n),
-        np.array([joint.dynamics.friction for joint in moving]) if friction else np.zeros(n),
-        np.array([joint.dynamics.armature for joint in moving]) if armature else np.zeros(n),
-    )
+    switches = {"damping": damping, "friction": friction, "armature": armature}
+    switches |= {"stiffness": springs, "spring_reference": springs}
+    dynamics = {
+        name: np.array([getattr(joint.dynamics, name) if acts else 0.0 for joint in moving])
+        for name, acts in switches.items()
+    }
+    return RobotLayout(robot.name, model, np.array(robot.q), np.array(robot.v), lower, upper, **dynamics)
 
 
 def _body(body: SceneBody) -> BodyLayout:
@@ -164,13 +163,18 @@ def _with_provided_joints(robot: RobotLayout, provided: frozenset[Feature]) -> R
         Feature.DAMPING: robot.damping,
         Feature.DRY_FRICTION: robot.friction,
         Feature.ARMATURE: robot.armature,
+        Feature.SPRINGS: robot.stiffness,
     }
     missing = {feature for feature, values in present.items() if values.any()} - provided
+    if not missing:
+        return robot
     nothing = np.zeros(len(robot.damping))
+    # Springs are outside with anything else, whose torque depends on all other torques.
+    elastic = replace(robot, stiffness=nothing, spring_reference=nothing)
     if missing & {Feature.DAMPING, Feature.ARMATURE}:
         # Both change the acceleration for which an engine computes the others.
-        return replace(robot, damping=nothing, friction=nothing, armature=nothing)
-    return replace(robot, friction=nothing) if missing else robot
+        return replace(elastic, damping=nothing, friction=nothing, armature=nothing)
+    return replace(elastic, friction=nothing) if Feature.DRY_FRICTION in missing else elastic
 
 
 def may_be_reached(layout: Layout, robot: int) -> bool:

@@ -44,8 +44,6 @@ from dynx.world.notes import (
     overlaps_of,
 )
 from dynx.world.preparation import JointDynamics, checked_options, layout_for, prepare
-from dynx.world.scene.documents import scene_document, scene_from_document
-from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.scene import MARGIN, Scene
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
 
@@ -128,6 +126,10 @@ def identity(layout: Layout, options: Mapping[str, Any]) -> str:
     return digest.hexdigest()
 
 
+_SPRING = ("stiffness", "spring_reference")
+"""Fields of springs, of joints and of layouts of robots."""
+
+
 def _feed(digest: Any, value: Any) -> None:
     digest.update(type(value).__name__.encode())
     if isinstance(value, np.ndarray):
@@ -140,9 +142,9 @@ def _feed(digest: Any, value: Any) -> None:
         _feed(digest, value.hull)
     elif is_dataclass(value):
         for field in fields(value):
-            # Files of earlier versions have robots without armature.
-            absent = isinstance(value, RobotLayout) and field.name == "armature" and not value.armature.any()
-            if field.compare and not absent:
+            # Files of earlier versions have robots without armature and joints without springs.
+            added = field.name in _SPRING or (isinstance(value, RobotLayout) and field.name == "armature")
+            if field.compare and not (added and not np.any(getattr(value, field.name))):
                 _feed(digest, getattr(value, field.name))
     elif isinstance(value, tuple | list):
         digest.update(repr(len(value)).encode())
@@ -161,8 +163,8 @@ LoadsOf = Callable[["World"], Mapping[str, Any]]
 class World:
     """The robots and bodies of a scene in motion, with contacts, in steps of `dt` [s].
 
-    Each step consists of `substeps` steps of the engine. `joint_limits`, `joint_damping`, `joint_friction`
-    and `joint_armature` switch these properties of the robot descriptions on or off. If the engine does not
+    Each step consists of `substeps` steps of the engine. `joint_limits`, `joint_damping`, `joint_friction`,
+    `joint_armature` and `joint_springs` switch these properties of the robot descriptions on or off. If the engine does not
     have a part of the joint dynamics, dynx computes it. Without `collisions` there are no contacts.
     `settings` are settings of the engine (`World.settings`); the reference of worlds lists them.
 
@@ -187,6 +189,7 @@ class World:
         joint_damping: JointDynamics = True,
         joint_friction: JointDynamics = True,
         joint_armature: JointDynamics = True,
+        joint_springs: JointDynamics = True,
         keep_last_step: bool = False,
         contact_interval: float | None = None,
         **settings: object,
@@ -204,6 +207,7 @@ class World:
             "joint_damping": joint_damping,
             "joint_friction": joint_friction,
             "joint_armature": joint_armature,
+            "joint_springs": joint_springs,
         }
         self.options: Mapping[str, Any] = checked_options(dt, substeps, **switches)
         """Options of the world other than the engine's settings."""
@@ -551,6 +555,8 @@ class World:
         Raises DescriptionError for a collision shape that a file cannot have, and ArgumentError for another
         suffix and for a file that cannot be written.
         """
+        from dynx.world.scene.documents import scene_document
+
         options = {**self.options, **self._kept}
         given = {"engine": self.engine, "options": options, "settings": dict(self.settings)}
         write_snapshot(path, self.save(), {"scene": scene_document(self.scene), **given})
@@ -587,10 +593,13 @@ class World:
         expanded, which evaluates expressions of it as Python code. Raises ArgumentError for a file that is
         damaged, of another version of the engine, or whose meshes changed.
         """
+        from dynx.world.scene.documents import scene_from_document
+        from dynx.world.scene.paths import ScenePaths
+
         snapshot, given = read_snapshot(path)
         scene = scene_from_document(given["scene"], ScenePaths(None, package_dirs))
-        # Worlds of earlier versions had no armature.
-        options = {"joint_armature": False, **given["options"]}
+        # Worlds of earlier versions had neither armature nor springs.
+        options = {"joint_armature": False, "joint_springs": False, **given["options"]}
         world = cls(scene, given["engine"], **options, **given["settings"])
         try:
             world.restore(snapshot)
@@ -608,6 +617,8 @@ class World:
         the same steps."""
         if self._identity is None:
             options = {**self.options, **self.settings}
+            # Its effect is in the layout.
+            del options["joint_springs"]
             # Files of earlier versions do not have these.
             added = {"joint_armature": False, "link_damping": 0.0, "friction_anchors": False}
             for name in added.keys() & options.keys():

@@ -96,8 +96,8 @@ FLOWS = {
         "World(Scene('box', bodies=(box('box', (0.1, 0.1, 0.1), mass=1.0),)), 'mujoco').step()",
         ("ik", "sim", "envs", "doctor"),
         (),
-        112,
-        20300,
+        104,
+        18750,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"

@@ -71,7 +71,7 @@ CHANGES: dict[str, Callable[[Model], Model]] = {
     "limit of velocity or effort of joint 'j'": lambda model: of_joint(
         model, limits=Limits(-1.0, 2.0, 3.0, 4.1)
     ),
-    "damping, friction or armature of joint 'j'": lambda model: of_joint(
+    "damping, friction, armature or spring of joint 'j'": lambda model: of_joint(
         model, dynamics=JointDynamics(armature=1e-9)
     ),
     "type of joint 'j'": lambda model: of_joint(model, type="prismatic"),

@@ -4,5 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-RIGID_BODIES: dict[str, Any] = {"joint_damping": False, "joint_friction": False, "joint_armature": False}
+RIGID_BODIES: dict[str, Any] = {
+    "joint_damping": False,
+    "joint_friction": False,
+    "joint_armature": False,
+    "joint_springs": False,
+}
 """Options of `simulate`, of batches and scenarios, of worlds and of observers."""

@@ -45,7 +45,8 @@ def arm() -> dynx.Model:
         f"""<joint name="j{k}" type="revolute">
           <parent link="l{k}"/><child link="l{k + 1}"/><origin xyz="{0.3 * k} 0 0"/><axis xyz="0 1 0"/>
           <limit lower="-0.2" upper="{0.4 - 0.45 * k}" effort="9" velocity="9"/>
-          <dynamics damping="0.3" friction="0.4" armature="0.1"/></joint>
+          <dynamics damping="0.3" friction="0.4" armature="0.1"/>
+          <dynx_spring stiffness="20" reference="0.3"/></joint>
         <link name="l{k + 1}">{INERTIAL}<collision><origin xyz="0.15 0 0"/><geometry>
           <box size="0.25 0.05 0.05"/></geometry></collision></link>"""
         for k in range(2)
@@ -92,6 +93,7 @@ CHANGES: dict[str, Callable[[], tuple[Scene, dict[str, Any]]]] = {
     "joint_damping": lambda: (scene_with(), {"joint_damping": False}),
     "joint_friction": lambda: (scene_with(), {"joint_friction": False}),
     "joint_armature": lambda: (scene_with(), {"joint_armature": False}),
+    "joint_springs": lambda: (scene_with(), {"joint_springs": False}),
     "substeps": lambda: (scene_with(), {"substeps": 2}),
     "forces": lambda: (scene_with(), {"forces": [PUSH]}),
     "forces with a point": lambda: (scene_with(), {"forces": [replace(PUSH, point=(0.0, 0.05, 0.0))]}),

@@ -158,7 +158,9 @@ _force_option = click.option(
 @_q_option
 @_v_option
 @sample_option("a", "Acceleration (default: zero)")
-@click.option("--joint-dynamics", is_flag=True, help="Include damping, friction and armature of the joints.")
+@click.option(
+    "--joint-dynamics", is_flag=True, help="Include damping, friction, armature and springs of the joints."
+)
 @payload_option
 @_force_option
 @click.option(
@@ -194,7 +196,9 @@ def id_() -> None:
 @_q_option
 @_v_option
 @sample_option("tau", "Torque (default: zero)")
-@click.option("--joint-dynamics", is_flag=True, help="Include damping, friction and armature of the joints.")
+@click.option(
+    "--joint-dynamics", is_flag=True, help="Include damping, friction, armature and springs of the joints."
+)
 @payload_option
 @_force_option
 @runs("dynx.cli.queries.evaluate:forward_dynamics")

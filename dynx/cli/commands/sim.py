@@ -136,7 +136,7 @@ _controller = (
     click.option(
         "--controller-joint-dynamics",
         is_flag=True,
-        help="Armature, damping and friction of the robot description in the model of the controller "
+        help="Armature, damping, friction and springs of the description in the model of the controller "
         "(default: rigid bodies).",
     ),
 )
@@ -144,7 +144,7 @@ _controller = (
 _joint_dynamics = click.option(
     "--no-joint-dynamics",
     is_flag=True,
-    help="Joints without the damping, friction and armature of the robot description.",
+    help="Joints without the damping, friction, armature and springs of the robot description.",
 )
 
 _results = group(

@@ -486,15 +486,19 @@ def value_range(values: float | list[float]) -> str:
     return smallest if smallest == largest else f"{smallest} to {largest}"
 
 
+KINDS_OF_JOINT_DYNAMICS = ("damping", "friction", "armature", "stiffness")
+"""Coefficients of joints in the settings of a record."""
+
+
 def _plant_deviations(report: Entry) -> list[str]:
     settings = report["settings"]
     payloads = [
         f"payload {number(each['mass'])} kg on {one_line(each['frame'])}" for each in report["payload"]
     ]
     parts = _listed(payloads, "payloads") + _mass_parts(report["mass_scale"])
-    # A floating base has no damping, friction or armature.
+    # A floating base has no joint dynamics.
     base = 6 if report["base"] == "floating" else 0
-    joints = {name: settings["joints"][name][base:] for name in ("damping", "friction", "armature")}
+    joints = {name: settings["joints"][name][base:] for name in KINDS_OF_JOINT_DYNAMICS}
     parts += [f"{name} {value_range(each)}" for name, each in joints.items() if any(each)]
     parts += _listed([_push_text(each) for each in settings["pushes"]], "pushes")
     if not settings["joint_limits"]:

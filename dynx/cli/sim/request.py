@@ -162,7 +162,8 @@ def _settings(model: Model, given: dict[str, Any]) -> dict[str, Any]:
     """
     settings: dict[str, Any] = {}
     if given["no_joint_dynamics"]:
-        settings |= dict.fromkeys(("joint_damping", "joint_friction", "joint_armature"), False)
+        names = ("joint_damping", "joint_friction", "joint_armature", "joint_springs")
+        settings |= dict.fromkeys(names, False)
     for name, each in OPTIONS.items():
         value = given.get(name)
         if is_command_option(each) and value not in (None, ()):

@@ -5,8 +5,9 @@ are
 
     dp/dt = tau - friction + C' v - g + tau_ext,
 
-which has no acceleration. They hold for the twist of a floating base too, for which p is the momentum of the
-robot at the base frame, in its axes. The residual
+where g is the torque that holds the robot against gravity and springs. They have no acceleration, and hold
+for the twist of a floating base too, for which p is the momentum of the robot at the base frame, in its axes.
+The residual
 
     r = gain (p(t) - p(0) - integral of (tau - friction + C' v - g + r))
 
@@ -27,13 +28,15 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types
 from dynx.backends import Backend
 from dynx.backends.dynamics import Dynamics, EngineDynamics
+from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.joint_friction import Coefficients, JointFriction, armature_matrix, checked_slip
 from dynx.control.base import ModelEvaluation, engine_of, parameter, substitute
 from dynx.control.friction import kept_coefficients
 from dynx.control.observers.wrench_estimate import MIN_RATIO, WrenchEstimate, estimate_wrenches
 from dynx.errors import ArgumentError, GainError, ShapeError, shown
 from dynx.model import Model
-from dynx.model.numbers import checked_array, checked_entries, checked_gain, real_array
+from dynx.model.elements import JointSprings
+from dynx.model.numbers import checked_array, checked_bool, checked_entries, checked_gain, real_array
 from dynx.option_names import checks_field_names
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.registry import DEFAULT_ENGINE
@@ -62,10 +65,13 @@ class MomentumObserver(ModelEvaluation):
     joint_friction: bool | Floats = parameter("N m or N")
     friction_slip: float = parameter("rad/s or m/s")
     joint_armature: bool | Floats = parameter("kg m^2 or kg")
+    joint_springs: bool = parameter("")
     losses: JointFriction = field(init=False)
     """Damping and dry friction that are subtracted from the torque of the motors."""
     armature: Floats = field(init=False)
     """Armature (nv, nv), which is added to the mass matrix."""
+    springs: JointSprings | None = field(init=False)
+    """Springs, whose torque is added to that of the motors; None if there are none."""
     dynamics: Dynamics = field(init=False)
 
     def __init__(
@@ -78,13 +84,14 @@ class MomentumObserver(ModelEvaluation):
         joint_friction: Coefficients = True,
         friction_slip: float = 0.0,
         joint_armature: Coefficients = True,
+        joint_springs: bool = True,
         backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """`time_constant` [s] or `gain` [1/s], one number or one for each coordinate (nv,).
 
-        `joint_damping`, `joint_friction`, `friction_slip` and `joint_armature` have the meaning and the
-        defaults of `dynx.simulate`, those of the description. What is left out counts as an external torque,
-        as does the friction of a joint at rest, which no observer can tell from a force.
+        `joint_damping`, `joint_friction`, `friction_slip`, `joint_armature` and `joint_springs` have the
+        meaning and the defaults of `dynx.simulate`, those of the description. What is left out counts as an
+        external torque, as does the friction of a joint at rest, which no observer can tell from a force.
 
         Raises GainError for coefficients, ArgumentError for a backend of another robot.
         """
@@ -104,8 +111,10 @@ class MomentumObserver(ModelEvaluation):
             "joint_friction": kept_coefficients(model, "joint_friction", joint_friction),
             "friction_slip": checked_slip("friction_slip", friction_slip),
             "joint_armature": kept_coefficients(model, "joint_armature", joint_armature),
+            "joint_springs": checked_bool("joint_springs", joint_springs),
             "losses": JointFriction.of_options(model, joint_damping, joint_friction, friction_slip),
             "armature": armature_matrix(model, joint_armature, "joint_armature"),
+            "springs": JointDynamicsTerms(model).springs if joint_springs else None,
             "dynamics": EngineDynamics(engine_of(model, backend)),
         }
         for name, value in values.items():
@@ -126,9 +135,8 @@ class MomentumObserver(ModelEvaluation):
         nv = self.model.nv
         residual, momentum, rate, begun = state[:nv], state[nv : 2 * nv], state[2 * nv : 3 * nv], state[-1:]
         dynamics = self.dynamics
-        p, b = self._terms(
-            dynamics.mass_matrix(q), dynamics.coriolis_matrix(q, v), dynamics.gravity_torque(q), v
-        )
+        M, C = dynamics.mass_matrix(q), dynamics.coriolis_matrix(q, v)
+        p, b = self._terms(M, C, self._held(q, dynamics.gravity_torque(q)), v)
         external = (p - momentum) / dt - tau - 0.5 * (rate + b)
         left = np.exp(-dt * self.gain)
         return np.concatenate([begun * (left * residual + (1.0 - left) * external), p, b, 0.0 * begun + 1.0])
@@ -163,7 +171,8 @@ class MomentumObserver(ModelEvaluation):
             k = int(np.argmin(steps > 0.0))
             raise ArgumentError(f"t[{k + 1}] is {times[k + 1]:g}, not after t[{k}], {times[k]:g}")
         engine = self._backend
-        p, b = self._terms(engine.mass_matrix(q), engine.coriolis_matrix(q, v), engine.gravity_torque(q), v)
+        M, C = engine.mass_matrix(q), engine.coriolis_matrix(q, v)
+        p, b = self._terms(M, C, self._held(q, engine.gravity_torque(q)), v)
         external = np.diff(p, axis=0) / steps[:, None] - tau - 0.5 * (b[:-1] + b[1:])
         left = np.exp(-steps[:, None] * self.gain)
         found = np.zeros((n + 1, model.nv))
@@ -198,6 +207,10 @@ class MomentumObserver(ModelEvaluation):
         return found.of_one_frame() if isinstance(frame, str) else found
 
     # -- terms of the equations of motion -----------------------------------------------------
+
+    def _held(self, q: Array, g: Array) -> Array:
+        """Return the torque (..., nv) that holds the robot at rest at q against gravity `g` and springs."""
+        return g if self.springs is None else g - self.springs.torque(q)
 
     def _terms(self, M: Array, C: Array, g: Array, v: Array) -> tuple[Array, Array]:
         """Return the momentum (..., nv) and, besides the torques, its rate (..., nv)."""

@@ -33,8 +33,10 @@ from dynx.engines.drake.library import (
     FixedOffsetFrame,
     MultibodyPlant,
     PrismaticJoint,
+    PrismaticSpring,
     QuaternionFloatingJoint,
     RevoluteJoint,
+    RevoluteSpring,
     RigidTransform,
     RotationMatrix,
     SpatialInertia,
@@ -321,6 +323,9 @@ def _add_robot(
         kind = RevoluteJoint if moving.revolute else PrismaticJoint
         limits = robot.lower[index], robot.upper[index], robot.damping[index]
         joints.append(plant.AddJoint(kind(name, before, body.body_frame(), np.array(moving.axis), *limits)))
+        if robot.stiffness[index]:
+            spring = RevoluteSpring if moving.revolute else PrismaticSpring
+            plant.AddForceElement(spring(joints[-1], robot.spring_reference[index], robot.stiffness[index]))
         if robot.armature[index]:
             actuator = plant.AddJointActuator(name, joints[-1])
             actuator.set_default_rotor_inertia(robot.armature[index])

@@ -44,8 +44,10 @@ MultibodyForces: Any = _tree.MultibodyForces
 MultibodyPlant: Any = _plant.MultibodyPlant
 Parser: Any = _parsing.Parser
 PrismaticJoint: Any = _tree.PrismaticJoint
+PrismaticSpring: Any = _tree.PrismaticSpring
 QuaternionFloatingJoint: Any = _tree.QuaternionFloatingJoint
 RevoluteJoint: Any = _tree.RevoluteJoint
+RevoluteSpring: Any = _tree.RevoluteSpring
 RigidTransform: Any = _math.RigidTransform
 RotationMatrix: Any = _math.RotationMatrix
 SpatialInertia: Any = _tree.SpatialInertia
@@ -69,8 +71,10 @@ __all__ = [
     "MultibodyPlant",
     "Parser",
     "PrismaticJoint",
+    "PrismaticSpring",
     "QuaternionFloatingJoint",
     "RevoluteJoint",
+    "RevoluteSpring",
     "RigidTransform",
     "RotationMatrix",
     "SpatialInertia",

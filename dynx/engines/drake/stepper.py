@@ -162,7 +162,9 @@ class DrakeStepper(Stepper):
 
     @classmethod
     def provides(cls, layout: Layout) -> frozenset[Feature]:
-        return frozenset(Feature) - {Feature.DRY_FRICTION}
+        # A spring of Drake has no negative stiffness.
+        pushes = any((robot.stiffness < 0.0).any() for robot in layout.robots)
+        return frozenset(Feature) - {Feature.DRY_FRICTION} - ({Feature.SPRINGS} if pushes else set())
 
     def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
         return effective_materials()

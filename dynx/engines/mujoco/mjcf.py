@@ -641,6 +641,12 @@ def _add_joint(body: Element, robot: RobotLayout, index: int, joint: Joint) -> N
     given = joint_attributes(
         joint,
         (float(robot.lower[index]), float(robot.upper[index])),
-        JointDynamics(robot.damping[index], robot.friction[index], robot.armature[index]),
+        JointDynamics(
+            robot.damping[index],
+            robot.friction[index],
+            robot.armature[index],
+            robot.stiffness[index],
+            robot.spring_reference[index],
+        ),
     )
     SubElement(body, "joint", {"name": f"{robot.name}/{joint.name}"} | given)

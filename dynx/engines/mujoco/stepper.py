@@ -66,7 +66,7 @@ class CoupledRobot:
         M = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, M)
         M = M[part, part]
-        bias = data.qfrc_bias[part] + self._damping * data.qvel[part]
+        bias = data.qfrc_bias[part] + self._damping * data.qvel[part] - data.qfrc_spring[part]
         acceleration = S @ np.linalg.solve(S.T @ M @ S + self._damped, self.tau - S.T @ bias)
         force = M @ acceleration
         if self._damping.any():

@@ -160,7 +160,7 @@ class BulletStepper(Stepper):
 
     @classmethod
     def provides(cls, layout: Layout) -> frozenset[Feature]:
-        return frozenset(Feature) - {Feature.ARMATURE}
+        return frozenset(Feature) - {Feature.ARMATURE, Feature.SPRINGS}
 
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)

@@ -61,9 +61,10 @@ class Reach(RobotTask):
 
     Action (nv,) from -1 to 1. With ``actions="torque"``: the torque beyond that of gravity, 1 being the one
     that accelerates the joint alone by 20 rad/s^2 at the neutral configuration, with its armature and against
-    its dry friction; joints are damped by 2 /s beside their own damping. With ``actions="velocity"``: the
-    velocity, 1 being 1 rad/s or m/s, which the torque of the inverse dynamics approaches at a rate of 20 /s;
-    it includes armature, damping and the friction of a joint that moves at that velocity.
+    its dry friction; joints are damped by 2 /s beside their own damping, and springs are held. With
+    ``actions="velocity"``: the velocity, 1 being 1 rad/s or m/s, which the torque of the inverse dynamics
+    approaches at a rate of 20 /s; it includes armature, damping, springs and the friction of a joint that
+    moves at that velocity.
 
     Observation (2 nv + 9,): q, v, position of the frame [m], the vector from it to the goal [m], and the
     rotation vector from it to the goal [rad], in world axes. Reward: -(distance [m] + 0.2 angle [rad] + 0.001
@@ -174,7 +175,7 @@ class Reach(RobotTask):
                 # Damping acts on the velocity at the end of the step.
                 damping = joints.damping * (v + self.step_dt * a)
                 tau = tau + joints.armature * a + damping + joints.friction * np.sign(wanted)
-        return tau
+        return tau if joints is None or joints.springs is None else tau - joints.springs.torque(q)
 
     def errors(self, robot: Dynamics, state: State) -> tuple[Array, Array, Array]:
         """Return the position of the frame, and the vector and rotation vector to the goal, (3,) each."""

@@ -75,6 +75,8 @@ def joint_attributes(joint: Joint, limits: tuple[float, float], dynamics: JointD
         "damping": dynamics.damping,
         "frictionloss": dynamics.friction,
         "armature": dynamics.armature,
+        "stiffness": dynamics.stiffness,
+        "springref": dynamics.spring_reference,
     }
     return attributes(values | {name: value for name, value in coefficients.items() if value})
 

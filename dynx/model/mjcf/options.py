@@ -120,6 +120,7 @@ class MjcfOptions:
         """Add notes on flags, and on the settings of a `scene`, whose step is that of its world."""
         for flag, effect in (
             ("damper", "dampers are disabled: no joint has damping"),
+            ("spring", "springs are disabled: no joint has a spring"),
             ("frictionloss", "dry friction is disabled: no joint has friction"),
             ("limit", "limits are disabled in MuJoCo; the joints have theirs all the same"),
             *(() if scene else _OF_ONE_ROBOT.items()),

@@ -80,7 +80,6 @@ _IN_BODY = (
     *_NOT_READ,
     *_REFUSED,
 )
-_SPRING = "the spring (stiffness)"
 _NOT_READ_OF_BODIES = {"gravcomp": "weight is not compensated", "mocap": "it is fixed"}
 _NOT_IN_TREE = {
     "actuator": "no motor is read, and so no range of a motor",
@@ -577,7 +576,7 @@ class _TreeReader:
                     Pose.from_matrix(origin),
                     axis=(x, y, z),
                     limits=limits,
-                    dynamics=self._dynamics(element, what),
+                    dynamics=self._dynamics(element, kind, what),
                     line=element.line,
                 )
             )
@@ -730,7 +729,7 @@ class _TreeReader:
             self._reading.note(self._contacts.parameters, "parameters of <pair> are not read")
         return found
 
-    def _dynamics(self, element: Element, what: str) -> JointDynamics:
+    def _dynamics(self, element: Element, kind: str, what: str) -> JointDynamics:
         reading, given = self._reading, element.attributes
         coefficients = {}
         for attribute in ("damping", "stiffness"):
@@ -746,10 +745,13 @@ class _TreeReader:
             reading.note(element, f"springdamper of {what} is not read: it has no spring and no damping")
             coefficients = dict.fromkeys(coefficients, 0.0)
         options = self._document.options
-        if coefficients["stiffness"] and options.disabled("spring") is None:
-            self._held.setdefault(_SPRING, []).append((what, element))
+        stiffness = coefficients["stiffness"] if options.disabled("spring") is None else 0.0
+        if stiffness and reading.number_or(element, "springyield", what, 0.0):
+            reading.note(element, f"springyield of {what} is not read: its spring is elastic")
         friction = reading.number_or(element, "frictionloss", what, 0.0)
         return JointDynamics(
+            stiffness=stiffness,
+            spring_reference=self._position(element, "springref", kind, what),
             damping=coefficients["damping"] if options.disabled("damper") is None else 0.0,
             friction=friction if options.disabled("frictionloss") is None else 0.0,
             armature=reading.number_or(element, "armature", what, 0.0),
@@ -872,10 +874,8 @@ class _TreeReader:
 
     def _note_counts(self, root: Element) -> None:
         for kind, ((what, element), *others) in self._held.items():
-            noun, effect = (
-                ("joint", "it does not pull") if kind == _SPRING else ("body", _NOT_READ_OF_BODIES[kind])
-            )
-            more = f" and of {_counted(len(others), f'other {noun}')}" if others else ""
+            more = f" and of {_counted(len(others), 'other body')}" if others else ""
+            effect = _NOT_READ_OF_BODIES[kind]
             self._reading.note(element, f"{kind} of {what}{more} is not read: {effect}")
         self._reading.note_ignored()
 

@@ -105,7 +105,6 @@ class _RobotReader:
         self._shapes = LinkShapeReader(reading, self._frames, package_dirs)
         self._links: list[Link] = []
         self._joints: list[Joint] = []
-        self._springs: list[tuple[str, Element]] = []
         self._prefixes: dict[int, str] = {id(top): ""}
         self._parts = list(top.walk())
         self._own_names: dict[int, str] = {}
@@ -143,7 +142,6 @@ class _RobotReader:
             self._note_start(root)
         frames = self._frames_of({id(part) for part in read}, root)
         gravity = self._gravity(read)
-        self._note_springs()
         reading.note_unread()
         return Description(
             self._robot_name(),
@@ -491,10 +489,13 @@ class _RobotReader:
         for each, value in values.items():
             if value < 0.0:
                 reading.note(dynamics, f"the {each} of {what} is negative, so the joint gains energy")
-        reading.scalar(dynamics, "spring_reference", what, 0.0)
-        if reading.scalar(dynamics, "spring_stiffness", what, 0.0):
-            self._springs.append((what, dynamics))
-        return JointDynamics(**values, armature=armature)
+        stiffness = reading.scalar(dynamics, "spring_stiffness", what, 0.0)
+        if stiffness < 0.0:
+            reading.note(
+                dynamics, f"the spring_stiffness of {what} is negative, so the spring pushes the joint away"
+            )
+        reference = reading.scalar(dynamics, "spring_reference", what, 0.0)
+        return JointDynamics(**values, armature=armature, stiffness=stiffness, spring_reference=reference)
 
     def _armature(self, joint: NamedPart) -> float:
         """Return the armature that Drake's elements give to a joint of one axis; others have no motor."""
@@ -620,14 +621,6 @@ class _RobotReader:
                 root.element,
                 f"{root.what} is placed at {numbers} (x y z [m], roll pitch yaw [rad]); "
                 "neutral() puts it at the origin",
-            )
-
-    def _note_springs(self) -> None:
-        if self._springs:
-            (what, element), *others = self._springs
-            more = f" and of {len(others)} others" if others else ""
-            self._reading.note(
-                element, f"the spring (spring_stiffness) of {what}{more} is not read: it does not pull"
             )
 
 

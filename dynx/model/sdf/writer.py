@@ -207,10 +207,13 @@ class SdfWriter:
             _text(mimic, "reference", 0.0)
         self._add_limits(axis, joint)
         dynamics = joint.dynamics
-        if dynamics.damping or dynamics.friction:
+        if dynamics.damping or dynamics.friction or dynamics.stiffness:
             around = SubElement(axis, "dynamics")
             _text(around, "damping", dynamics.damping)
             _text(around, "friction", dynamics.friction)
+            if dynamics.stiffness:
+                _text(around, "spring_reference", dynamics.spring_reference)
+                _text(around, "spring_stiffness", dynamics.stiffness)
         if dynamics.armature:
             _text(element, ROTOR_INERTIA, dynamics.armature)
             _add(self._kinds, _ARMATURE, joint.name)

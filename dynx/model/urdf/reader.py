@@ -198,6 +198,9 @@ FRAME_TAG = "dynx_frame"
 LOCKED_TAG = "dynx_locked"
 """Extension written by `write_urdf`: the position at which a joint, written as fixed, was locked."""
 
+SPRING_TAG = "dynx_spring"
+"""Extension written by `write_urdf`: stiffness and reference of a joint's spring."""
+
 ROBOT_TAG = "dynx_robot"
 """Extension written by `write_urdf`: base, gravity and pose of the base, where they are not the default."""
 
@@ -214,7 +217,7 @@ _REFUSED = {
     "ball": "three revolute joints, with massless links between them",
 }
 _READ = frozenset(["origin", "parent", "child", "axis", "limit", "dynamics", "mimic"])
-_KNOWN_IN_JOINT = _READ | {"calibration", "safety_controller", "gazebo", LOCKED_TAG, FRAME_TAG}
+_KNOWN_IN_JOINT = _READ | {"calibration", "safety_controller", "gazebo", LOCKED_TAG, FRAME_TAG, SPRING_TAG}
 
 
 def read_joint(element: Element, reading: Reading, floating_is_base: bool = False) -> Joint:
@@ -329,10 +332,13 @@ def _limit(limit: Element, attribute: str, what: str, reading: Reading, default:
 
 
 def _read_dynamics(element: Element, what: str, reading: Reading) -> JointDynamics:
+    values = {}
+    for spring in element.all(SPRING_TAG):
+        values["stiffness"] = reading.number(spring, "stiffness", what)
+        values["spring_reference"] = reading.number_or(spring, "reference", what, 0.0)
     dynamics = reading.only(element, "dynamics")
     if dynamics is None:
-        return JointDynamics()
-    values = {}
+        return JointDynamics(**values)
     for attribute in ("damping", "friction", "armature"):
         values[attribute] = reading.number_or(dynamics, attribute, what, 0.0)
         if values[attribute] < 0.0:

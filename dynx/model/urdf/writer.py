@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 
 from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, shown
@@ -25,7 +26,7 @@ from dynx.model.geometry import (
     Visual,
 )
 from dynx.model.tree import STANDARD_GRAVITY, Tree
-from dynx.model.urdf.reader import FRAME_TAG, LOCKED_TAG, ROBOT_TAG
+from dynx.model.urdf.reader import FRAME_TAG, LOCKED_TAG, ROBOT_TAG, SPRING_TAG
 from dynx.model.xml.text import quoteattr
 from dynx.model.xml.values import name_fault
 
@@ -127,9 +128,10 @@ def write_urdf(tree: Tree, /, *, geometry: bool = False) -> str:
     `dynx.load` of the text returns an equal model; equality ignores shapes. Extensions state what URDF cannot
     express, and other readers ignore them: ``<dynx_robot>`` the base, its pose and gravity where they are
     not the default, ``<dynx_locked>`` the position of a locked joint, which is written as fixed,
-    ``<dynx_frame>`` that a massless link on a fixed joint is an added frame. An infinite limit is written as
-    the largest double, which every engine can read; limits of 1e60 (`dynx.model.numbers.MAX_MAGNITUDE`) or
-    more are read back as infinite. With `geometry` the visual and collision shapes are written too.
+    ``<dynx_spring>`` stiffness and reference of a joint's spring, ``<dynx_frame>`` that a massless link on a
+    fixed joint is an added frame. An infinite limit is written as the largest double, which every engine can
+    read; limits of 1e60 (`dynx.model.numbers.MAX_MAGNITUDE`) or more are read back as infinite. With
+    `geometry` the visual and collision shapes are written too.
 
     Raises DescriptionError for a name that URDF cannot express and for a number that is NaN, and with
     `geometry` as `write_shapes` does.
@@ -187,6 +189,10 @@ def urdf_notes(tree: Tree) -> Iterator[str]:
         (
             "The armature is an attribute of <dynamics> that other readers may ignore",
             [joint.name for joint in tree.joints if joint.dynamics.armature],
+        ),
+        (
+            f"URDF states no springs of joints: dynx alone reads them, in <{SPRING_TAG}>",
+            [joint.name for joint in tree.joints if joint.dynamics.stiffness],
         ),
     ):
         if names:
@@ -281,7 +287,10 @@ def _motion(joint: Joint) -> Iterator[str]:
     if joint.type == "continuous":
         ends = ""
     yield f'    <limit {ends}velocity="{_number(limits.velocity)}" effort="{_number(limits.effort)}"/>'
-    if dynamics != JointDynamics():
+    if dynamics.stiffness:
+        stiffness, reference = _number(dynamics.stiffness), _number(dynamics.spring_reference)
+        yield f'    <{SPRING_TAG} stiffness="{stiffness}" reference="{reference}"/>'
+    if replace(dynamics, stiffness=0.0) != JointDynamics():
         armature = f' armature="{_number(dynamics.armature)}"' if dynamics.armature else ""
         damping, friction = _number(dynamics.damping), _number(dynamics.friction)
         yield f'    <dynamics damping="{damping}" friction="{friction}"{armature}/>'

@@ -64,8 +64,9 @@ class SpringInInverseDynamics(CallingRule):
     MuJoCo falls in the others.
 
     What to do: add the force of the spring to your controller where the engine has none. The file is
-    correct, so ``dynx doctor --fix`` does not change it. dynx does not read springs either, and says so in
-    the notes of the model; doctor prints the call that switches them off in MuJoCo.
+    correct, so ``dynx doctor --fix`` does not change it. dynx reads the spring, and its quantities have it
+    with ``joint_dynamics=True``. doctor compares the rigid bodies alone, and prints the call that switches
+    springs off in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)

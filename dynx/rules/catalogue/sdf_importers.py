@@ -226,8 +226,9 @@ class SpringOfSdf(Rule):
     The effect is the stiffness times the distance from the reference.
 
     What to do: decide whether torques include springs. The file is correct, so ``dynx doctor --fix`` does
-    not change it. dynx does not read springs, and says so in the notes of the model. No call removes the
-    force element, so the effect in a report is what remains of the difference without all other causes.
+    not change it. dynx reads springs, and its quantities have them with ``joint_dynamics=True``; doctor
+    compares the rigid bodies alone. No call removes the force element, so the effect in a report is what
+    remains of the difference without all other causes.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)

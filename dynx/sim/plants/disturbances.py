@@ -1,7 +1,7 @@
-"""Joint friction, external forces and armature of a plant.
+"""Joint friction, springs, external forces and armature of a plant.
 
-Every plant uses this code. External forces become a torque, as a function of time and state, which is added
-to that of the motors; joint friction is solved for the velocity at the end of a step
+Every plant uses this code. External forces and springs become a torque, as a function of time and state,
+which is added to that of the motors; joint friction is solved for the velocity at the end of a step
 (`dynx.rbd.joint_friction`). So a push or a brake has the same effect in every engine.
 """
 
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynx.backends import Backend, backend
+from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.joint_friction import Coefficients, JointFriction, armature_matrix
 from dynx.errors import ArgumentError
 from dynx.model import Model
@@ -32,7 +33,7 @@ STABLE = {"rk4": 2.78, "adaptive": np.inf}
 
 @checks_field_names(damping="joint_damping", friction="joint_friction", armature="joint_armature")
 class Disturbances:
-    """Friction, armature and pushes that act on a plant, from the arguments of `dynx.simulate`.
+    """Friction, springs, armature and pushes that act on a plant, from the arguments of `dynx.simulate`.
 
     `step` is the time from one evaluation of `torque` to the next [s].
     """
@@ -46,6 +47,8 @@ class Disturbances:
         joint_armature: Coefficients = True,
         pushes: Sequence[ExternalForce] = (),
         step: float = 0.0,
+        *,
+        joint_springs: bool = True,
     ) -> None:
         """Raises GainError and ArgumentError for coefficients and pushes that `model` cannot have."""
         self.model = model
@@ -54,6 +57,8 @@ class Disturbances:
         self.armature = armature_matrix(model, joint_armature, "joint_armature")
         """Armature (nv, nv), added to the mass matrix."""
         self.has_armature = bool(self.armature.any())
+        self.springs = JointDynamicsTerms(model).springs if joint_springs else None
+        """Springs of the coordinates; None if none acts."""
         self._step = step
 
     if not TYPE_CHECKING:  # type checkers report an unknown attribute themselves
@@ -70,8 +75,9 @@ class Disturbances:
 
     @cached_property
     def has_torque(self) -> bool:
-        """True if pushes or friction with a slip speed add a torque, a function of time and state."""
-        return self.friction.smooth or bool(self.pushes)
+        """True if pushes, springs or friction with a slip speed add a torque, a function of time and
+        state."""
+        return self.friction.smooth or bool(self.pushes) or self.springs is not None
 
     def slowed(self, M: Floats, v: Floats, h: float) -> Floats:
         """Return the velocity (nv,) that joint friction leaves of `v` in a step of `h` [s].
@@ -97,7 +103,7 @@ class Disturbances:
     @property
     def joints(self) -> JointCoefficients:
         """Coefficients (nv,) that are solved for in each step: armature, and damping and dry friction without
-        a slip speed."""
+        a slip speed. Springs are a torque (`torque`)."""
         # Each joint depends on at most one coordinate, so the armature matrix is diagonal.
         armature = self.armature.diagonal().copy()
         if not self.sticks:
@@ -105,25 +111,40 @@ class Disturbances:
         return JointCoefficients(self.friction.viscous, self.friction.dry, armature)
 
     def load_on(self, engine: Backend) -> AddLoad | None:
-        """Return the function that adds the torque of pushes, and subtracts that of friction with a slip
-        speed, on a robot in `engine`; None without both."""
+        """Return the function that adds the torque of pushes and springs, and subtracts that of friction with
+        a slip speed, on a robot in `engine`; None without all of them."""
         if not self.has_torque:
             return None
         return lambda tau, q, v, t: self.added_to(tau, engine, t, q, v)
 
     def torque(self, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
-        """Return the torque (nv,) of pushes in a step that began at `t`, minus that of friction with a slip
-        speed."""
+        """Return the torque (nv,) of pushes and springs in a step that began at `t`, minus that of friction
+        with a slip speed."""
         return self.added_to(np.zeros(len(v)), engine, t, q, v)
 
     def added_to(self, tau: Floats, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
         """Return the torque `tau` (nv,) plus `torque`."""
+        if self.springs is not None:
+            tau = tau + self.springs.torque(q)
         shares = ((push, push.share(t, self._step)) for push in self.pushes)
         return with_disturbances(
             tau,
             self.friction(v) if self.friction.smooth else None,
             (push.at_frame(engine, push.on, q, share) for push, share in shares if share),
         )
+
+
+def notes_on_springs(disturbances: Disturbances, integrator: str | None, h: float, q: Floats) -> list[str]:
+    """Return one sentence for springs that are unstable in steps of `h` [s] at configuration `q` (nq,)."""
+    model, springs = disturbances.model, disturbances.springs
+    if springs is None:
+        return []
+    from dynx.steppers import stiff_springs  # most robots have none
+
+    with backend("reference", model, validate=False) as engine:
+        M = engine.mass_matrix(q) + disturbances.armature
+    bound = stiff_springs.STABLE.get(integrator or "", stiff_springs.SEMI_IMPLICIT)
+    return [*stiff_springs.notes_on_springs(model, springs, M, h, bound)]
 
 
 def refuse_small_slip(disturbances: Disturbances, integrator: str, h: float, q: Floats) -> None:

@@ -139,9 +139,9 @@ class Memory(NamedTuple):
 class WorldPlant(Plant):
     """A robot of a scene in `dynx.world.World`.
 
-    Armature, joint damping, and dry friction without a slip speed, are those of the world; friction with a
-    slip speed is a torque, as in the other plants. Pushes act in each step of the engine. Contacts and the
-    motion of the surroundings are recorded.
+    Armature, springs, joint damping, and dry friction without a slip speed, are those of the world; friction
+    with a slip speed is a torque, as in the other plants. Pushes act in each step of the engine. Contacts and
+    the motion of the surroundings are recorded.
     """
 
     def __init__(
@@ -245,8 +245,8 @@ def _scene_of(place: ScenePlant, model: Model, disturbances: Disturbances) -> Sc
 
 
 def with_joint_dynamics(model: Model, disturbances: Disturbances) -> Model:
-    """Return a model whose joints have the armature of a simulation, and the damping and dry friction that
-    are solved for (`Disturbances.sticks`)."""
+    """Return a model whose joints have the armature and springs of a simulation, and the damping and dry
+    friction that are solved for (`Disturbances.sticks`)."""
     friction, base = disturbances.friction, 6 if model.floating else 0
     laws: dict[str, JointDynamics] = {}
     if disturbances.sticks:
@@ -261,5 +261,9 @@ def with_joint_dynamics(model: Model, disturbances: Disturbances) -> Model:
     rotors = zip(model.coordinate_joints, disturbances.armature.diagonal()[base:].tolist(), strict=True)
     for joint, armature in rotors:
         laws[joint.name] = replace(laws.get(joint.name, JointDynamics()), armature=armature)
+    for joint in model.joints if disturbances.springs is not None else ():
+        own = joint.dynamics
+        spring = {"stiffness": own.stiffness, "spring_reference": own.spring_reference}
+        laws[joint.name] = replace(laws.get(joint.name, JointDynamics()), **spring)
     joints = tuple(replace(joint, dynamics=laws.get(joint.name, JointDynamics())) for joint in model.joints)
     return model if joints == model.joints else replace(model, joints=joints)

@@ -23,6 +23,7 @@ from dynx.rbd.joint_wrenches import about_world
 from dynx.rbd.parameters import plant_model
 from dynx.registry import door, explains_names
 from dynx.sim.controller_checks import controller_numbers
+from dynx.sim.plants.disturbances import notes_on_springs
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import Unknown
 from dynx.sim.scenario.scenario import RecordedScenario, Scenario
@@ -173,9 +174,11 @@ class Rollout:
 
     @cached_property
     def energy(self) -> Floats:
-        """Sum of kinetic and potential energy (n + 1,) [J], computed by dynx for every plant."""
+        """Sum of kinetic and potential energy (n + 1,) [J], that of the springs which act included, computed
+        by dynx for every plant."""
+        springs = self.scenario is not None and self.scenario.joint_springs
         with backend("reference", self.model) as bodies:
-            return np.asarray(self.kinetic_energy + bodies.potential_energy(self.q))
+            return np.asarray(self.kinetic_energy + bodies.potential_energy(self.q, joint_dynamics=springs))
 
     @cached_property
     def external_forces(self) -> dict[str, Floats]:
@@ -356,8 +359,8 @@ class Rollout:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences on what is hardly meant: joints that start beyond their limits, which stop them, or far
-        beyond, gravity that points up; in a scene also those of its world at the start
-        (`dynx.world.World.notes`)."""
+        beyond, springs too stiff for the step, gravity that points up; in a scene also those of its world at
+        the start (`dynx.world.World.notes`)."""
         # Imported here, because `simulate` needs it no more than other programs.
         from dynx.model.unlikely_inputs import gravity_notes, position_notes
 
@@ -370,6 +373,10 @@ class Rollout:
             own += notes_on_limits(beyond_limits(names, joints, *stop_positions(model)), MOVES_NO_FURTHER)
             limits = [(each.name, each.limits) for each in model.coordinate_joints]
             own += notes_on_held_joints([name for name, each in limits if each.lower == each.upper])
+        if scenario is not None and scenario.joint_springs and not isinstance(scenario.plant, ScenePlant):
+            steps = whole_number("substeps", scenario.substeps, 1)
+            acting = disturbances_of(scenario, model)
+            own += notes_on_springs(acting, scenario.integrator, scenario.dt / steps, q)
         return tuple(dict.fromkeys((*own, *(self.surroundings.notes if self.surroundings else ()))))
 
     def __repr__(self) -> str:
@@ -402,7 +409,7 @@ def settings_of(scenario: Scenario) -> dict[str, Any]:
     controller, clock, limit = scenario.controller, clock_of(scenario), effort_limits_of(scenario)
     moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
     disturbances = disturbances_of(scenario, moved)
-    friction = disturbances.friction
+    friction, springs = disturbances.friction, disturbances.springs
     return {
         "plant": str(scenario.plant),
         "integrator": scenario.with_defaults().integrator,
@@ -418,6 +425,7 @@ def settings_of(scenario: Scenario) -> dict[str, Any]:
             "damping": friction.damping.tolist(),
             "friction": friction.friction.tolist(),
             "slip": friction.slip,
+            "stiffness": np.zeros(moved.nv).tolist() if springs is None else springs.stiffness.tolist(),
         },
         "noise": None if scenario.noise is None else repr(scenario.noise),
         "pushes": [repr(push) for push in disturbances.pushes],

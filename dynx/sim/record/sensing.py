@@ -164,4 +164,5 @@ def _layout(scene: Scene) -> Layout:
         joint_damping=False,
         joint_friction=False,
         joint_armature=False,
+        joint_springs=False,
     )

@@ -470,6 +470,9 @@ class SimulationOptions:
         group=JOINTS,
         default_words="the description's",
     )
+    joint_springs: bool = option(
+        True, "Springs of the joints, as the robot description has them", kind=FLAG, group=JOINTS
+    )
     effort_limits: Coefficients = option(
         False,
         "Limits at which torques are saturated",

@@ -321,7 +321,12 @@ class ScenarioArguments(SimulationOptions):
         return Scenario(load(self.model), **given)
 
 
-JOINT_TERMS = {"joint_damping": "damping", "joint_friction": "friction", "joint_armature": "rotors"}
+JOINT_TERMS = {
+    "joint_damping": "damping",
+    "joint_friction": "friction",
+    "joint_armature": "rotors",
+    "joint_springs": "stiffness",
+}
 """Attribute of `JointDynamicsTerms` with the coefficients of the description, by the name of the option."""
 
 LIMITS = "joint_limits"

@@ -134,7 +134,7 @@ LIMITS: dict[JointType, Strategy[Limits]] = {
     "continuous": _limits(3.0).map(lambda dropped: Limits()),
     "prismatic": _limits(1.0),
 }
-DYNAMICS = optional(st.builds(JointDynamics, *[numbers(1.0).map(abs)] * 3)).map(
+DYNAMICS = optional(st.builds(JointDynamics, *[numbers(1.0).map(abs)] * 4, numbers(1.0))).map(
     lambda dynamics: dynamics or JointDynamics()
 )
 

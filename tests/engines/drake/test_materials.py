@@ -34,6 +34,7 @@ def layout(rows: list[Material], ignored: list[tuple[int, int]]) -> Layout:
         joint_damping=True,
         joint_friction=True,
         joint_armature=True,
+        joint_springs=True,
     )
 
 

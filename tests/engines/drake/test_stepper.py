@@ -24,6 +24,7 @@ SWITCHES = {
     "joint_damping": True,
     "joint_friction": False,
     "joint_armature": True,
+    "joint_springs": True,
 }
 DEFAULTS = {name: setting.default for name, setting in DrakeStepper.settings.items()}
 

@@ -100,7 +100,12 @@ def test_steps_are_those_of_simulate_bit_for_bit(base: str, integrator: str) -> 
     model = mixed_robot(base, mimic=True)
     rng = np.random.default_rng(5)
     q, v = model.random(rng), 0.3 * rng.standard_normal(model.nv)
-    joints: dict[str, Any] = {"joint_damping": True, "joint_friction": True, "joint_armature": True}
+    joints: dict[str, Any] = {
+        "joint_damping": True,
+        "joint_friction": True,
+        "joint_armature": True,
+        "joint_springs": True,
+    }
     rollout = dynx.simulate(
         model,
         plant="pinocchio",

@@ -23,7 +23,7 @@ OLDER = {"passive", "sensornoise"}
 OFF_AT_FIRST = {"diagexact", "energy", "fwdinv", "invdiscrete", "ipc", "override", "sensornoise", "sleep"} | {
     "speculative"
 }
-EXACT = {"gravity", "spring"}
+EXACT = {"gravity"}
 """Flags whose effect dynx has without a note; in a scene these, too: contact and filterparent."""
 
 
@@ -63,7 +63,7 @@ def test_each_flag_has_its_effect_or_a_note(name: str, tmp_path: Path) -> None:
     added = [note for note in found.notes if note.message not in {each.message for each in plain.notes}]
     if name in EXACT:
         assert not added
-        assert (found.gravity, len(found.notes)) != (plain.gravity, len(plain.notes))
+        assert found.gravity != plain.gravity
     else:
         assert added
         assert all(note.line == 2 for note in added)
@@ -73,20 +73,22 @@ def test_each_flag_has_its_effect_or_a_note(name: str, tmp_path: Path) -> None:
 
 @given(st.sets(st.sampled_from(["damper", "frictionloss", "spring", "constraint", "gravity"])))
 def test_passive_forces_are_those_of_mujoco(disabled: set[str]) -> None:
-    # Without springs, which no model has: the torques of dampers and dry friction remain.
     stated = "".join(f' {name}="disable"' for name in sorted(disabled))
-    content = text(f"<option><flag{stated}/></option>", 'damping="0.05" frictionloss="0.2"')
+    content = text(
+        f"<option><flag{stated}/></option>", 'damping="0.05" frictionloss="0.2" stiffness="3" springref="20"'
+    )
     model = dynx.load(content)
     compiled = mujoco.MjModel.from_xml_string(content)
     data = mujoco.MjData(compiled)
-    data.qvel[0] = 1.5
+    data.qvel[0], data.qpos[0] = 1.5, 0.7
     mujoco.mj_forward(compiled, data)
     dynamics = model.joint("s").dynamics
-    assert np.isclose(-dynamics.damping * 1.5, data.qfrc_passive[0], rtol=1e-12, atol=0.0)
+    passive = -dynamics.damping * 1.5 - dynamics.stiffness * (0.7 - dynamics.spring_reference)
+    assert np.isclose(passive, data.qfrc_passive[0], rtol=1e-12, atol=0.0)
     rows = data.efc_frictionloss[: data.nefc]
     assert dynamics.friction == (rows.max() if len(rows) else 0.0)
     weight = dynx.backend("reference", model).gravity_torque(np.zeros(1))
-    data.qvel[0] = 0.0
+    data.qvel[0] = data.qpos[0] = 0.0
     mujoco.mj_forward(compiled, data)
     assert np.allclose(weight, data.qfrc_bias, rtol=1e-9, atol=1e-12)
 
@@ -96,12 +98,10 @@ def test_the_last_flag_of_a_name_counts() -> None:
     assert dynx.load(text(both)).joint("s").dynamics.damping == 0.05
 
 
-def test_limits_stay_and_springs_have_a_note_unless_they_are_disabled() -> None:
+def test_limits_stay() -> None:
     model = dynx.load(text(flag("limit", "disable")))
     assert np.isfinite(model.joint("s").limits.upper)
     assert any("limits" in note.message for note in model.notes)
-    assert any("spring" in note.message for note in model.notes)
-    assert not any("spring" in note.message for note in dynx.load(text(flag("spring", "disable"))).notes)
 
 
 def test_couplings_are_not_read_where_they_are_disabled() -> None:

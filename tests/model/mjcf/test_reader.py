@@ -444,7 +444,7 @@ def test_what_is_not_part_of_the_model_is_named() -> None:
     for word in ("<sensor>", "<equality>", "<tendon>", "<keyframe>", "<contact>"):
         assert f"not read: 1 element of {word}" in notes
     assert "1 element of <actuator>: model.actuators has them as data" in notes
-    for word in ("stiffness", "viscosity", "gravcomp", "polynomial"):
+    for word in ("stiffness of joint 'hinge' is a polynomial", "viscosity", "gravcomp", "polynomial"):
         assert word in notes
 
 

@@ -201,7 +201,8 @@ def test_a_joint_whose_child_is_nearer_to_the_root_is_turned_round() -> None:
 def test_limits_dynamics_and_mimic() -> None:
     axis = (
         "<axis><xyz>0 1 0</xyz><limit><lower>-1e16</lower><upper>inf</upper><velocity>-1</velocity></limit>"
-        "<dynamics><damping>0.5</damping><friction>0.2</friction><spring_stiffness>3</spring_stiffness></dynamics>"
+        "<dynamics><damping>0.5</damping><friction>0.2</friction><spring_stiffness>3</spring_stiffness>"
+        "<spring_reference>0.1</spring_reference></dynamics>"
         "</axis>"
     )
     follower = (
@@ -214,7 +215,8 @@ def test_limits_dynamics_and_mimic() -> None:
     hinge = model.joint("hinge")
     assert (hinge.type, hinge.limits.velocity) == ("continuous", np.inf)
     assert (hinge.dynamics.damping, hinge.dynamics.friction) == (0.5, 0.2)
-    assert any("spring_stiffness" in note.message for note in model.notes)
+    assert (hinge.dynamics.stiffness, hinge.dynamics.spring_reference) == (3.0, 0.1)
+    assert not any("spring" in note.message for note in model.notes)
     mimic = model.joint("slide").mimic
     assert mimic is not None
     assert (mimic.joint, mimic.multiplier) == ("hinge", 2.0)

@@ -14,6 +14,7 @@ import pytest
 import dynx
 from dynx import control
 from dynx.errors import ArgumentError, LimitError, UnknownNameError
+from dynx.model import JointDynamics
 from dynx.rbd.parameters import Payload
 from dynx.sim import Scenario, Simulation, simulate, simulate_batch
 from dynx.sim.scenario.options import OPTIONS, SimulationOptions, option, options_of, takes
@@ -132,7 +133,9 @@ def test_a_friction_of_each_rollout_makes_its_slip_effective() -> None:
     assert simulate_batch(scenario, joint_friction=np.full((2, ARM.nv), 1e-3)).done.all()
 
 
+SPRING = JointDynamics(stiffness=2.0, spring_reference=0.4)
 TWO_LINKS = dynx.load("planar_2r")
+TWO_LINKS = replace(TWO_LINKS, joints=tuple(replace(each, dynamics=SPRING) for each in TWO_LINKS.joints))
 TIP = TWO_LINKS.frame_names[-1]
 OTHERS: dict[str, Any] = {
     "plant": "mujoco",
@@ -152,6 +155,7 @@ OTHERS: dict[str, Any] = {
     "joint_friction": 0.3,
     "friction_slip": 0.1,
     "joint_armature": 0.3,
+    "joint_springs": False,
     "effort_limits": 0.1,
     "joint_limits": False,
     "payload": Payload(TIP, 1.0),

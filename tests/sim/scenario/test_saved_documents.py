@@ -133,11 +133,11 @@ def test_stops_of_a_robot_without_limits_are_no_difference() -> None:
         assert [each.field for each in theirs.differences(ours)] == wanted
 
 
-@pytest.mark.parametrize("name", ["joint_damping", "joint_friction", "joint_armature"])
+@pytest.mark.parametrize("name", ["joint_damping", "joint_friction", "joint_armature", "joint_springs"])
 def test_joint_dynamics_that_a_description_does_not_have_are_no_difference(name: str) -> None:
     """So a record of an earlier version is resumed by today's scenario of a robot without them."""
     plain, off = load("ur5"), dict[str, Any]({name: False})
-    dynamics = JointDynamics(damping=0.1, friction=0.1, armature=0.1)
+    dynamics = JointDynamics(damping=0.1, friction=0.1, armature=0.1, stiffness=0.1)
     has = replace(plain, joints=tuple(replace(each, dynamics=dynamics) for each in plain.joints))
     for robot, wanted in ((plain, []), (has, [name])):
         ours = Scenario(robot, duration=0.01)
