@@ -46,7 +46,7 @@ def arm() -> dynx.Model:
           <parent link="l{k}"/><child link="l{k + 1}"/><origin xyz="{0.3 * k} 0 0"/><axis xyz="0 1 0"/>
           <limit lower="-0.2" upper="{0.4 - 0.45 * k}" effort="9" velocity="9"/>
           <dynamics damping="0.3" friction="0.4" armature="0.1"/>
-          <dynx_spring stiffness="20" reference="0.3"/></joint>
+          <dynx_spring stiffness="1" reference="0.3"/></joint>
         <link name="l{k + 1}">{INERTIAL}<collision><origin xyz="0.15 0 0"/><geometry>
           <box size="0.25 0.05 0.05"/></geometry></collision></link>"""
         for k in range(2)
