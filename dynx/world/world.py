@@ -164,8 +164,9 @@ class World:
     """The robots and bodies of a scene in motion, with contacts, in steps of `dt` [s].
 
     Each step consists of `substeps` steps of the engine. `joint_limits`, `joint_damping`, `joint_friction`,
-    `joint_armature` and `joint_springs` switch these properties of the robot descriptions on or off. If the engine does not
-    have a part of the joint dynamics, dynx computes it. Without `collisions` there are no contacts.
+    `joint_armature` and `joint_springs` switch these properties of the robot descriptions on or off. If the
+    engine does not have a part of the joint dynamics, dynx computes it. Without `collisions` there are no
+    contacts.
     `settings` are settings of the engine (`World.settings`); the reference of worlds lists them.
 
     With `keep_last_step`, or for a scene with sensors, the world keeps the state before each step of the
