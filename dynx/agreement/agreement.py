@@ -123,7 +123,7 @@ def _compare_all(
         progress(f"{first.name}~{second.name}")
         rows += [compare(quantity, first, second, magnitudes) for quantity in compared_quantities()]
         rows.append(compare_forward_dynamics(first, second, magnitudes))
-        if model.nv:
+        if model.nv and not model.ball_joints:
             rows.append(compare_inverse_kinematics(first, second, magnitudes))
     if referee_samples:
         progress(REFEREE)
@@ -197,6 +197,8 @@ def _notes(model: Model, names: list[str]) -> tuple[str, ...]:
             f"the mass matrix is singular ({singular.reason}): "
             "forward dynamics has no solution, and each backend must refuse it"
         )
+    if model.ball_joints:
+        notes.append("the robot has ball joints, which inverse kinematics does not take: it is not compared")
     if len(names) == 1:
         notes.append("a single backend: compared with the referee and with itself only")
     return tuple(notes)

@@ -174,8 +174,9 @@ def _wrenches_along_axes(backend: Backend, samples: Samples, magnitudes: Magnitu
     for number, joint in enumerate(model.joints):
         if joint.moves:
             rows = slice(0, 3) if joint.type == "prismatic" else slice(3, 6)
-            along.append(wrenches[:, number, rows] @ np.array(joint.axis))
-            sizes.append(size[:, rows.start])
+            for axis in np.eye(3) if joint.type == "ball" else [np.array(joint.axis)]:
+                along.append(wrenches[:, number, rows] @ axis)
+                sizes.append(size[:, rows.start])
     if not along:
         return np.zeros((len(samples), 0)), np.ones(1)
     coupling = model.mechanism.coupling

@@ -49,7 +49,7 @@ class Magnitudes:
         coupling = self._mechanism.coupling
         self._S = np.eye(self._mechanism.nv) if coupling is None else coupling.matrix()
         self._q_tree = samples.q if coupling is None else coupling.expand_q(samples.q)
-        self._joint_q = self._q_tree[:, 7 if samples.model.floating else 0 :]
+        self._joint_q = self._mechanism.joint_entries(self._q_tree)
         base = [False] * 3 + [True] * 3 if samples.model.floating else []
         self._rotates = np.array(base + [body.revolute for body in self._mechanism.bodies], dtype=bool)
 
@@ -88,7 +88,7 @@ class Magnitudes:
         start = np.linalg.norm(self.samples.q[:, :3], axis=-1) if self._model.floating else np.zeros(n)
         path = {ROOT: start}
         for index, body in enumerate(mechanism.bodies):
-            slide = 0.0 if body.revolute else np.abs(self._joint_q[:, index])
+            slide = 0.0 if body.revolute else np.abs(self._joint_q[index])
             path[index] = path[body.parent] + float(np.linalg.norm(body.p)) + slide
         ends = [path[frame.body] + float(np.linalg.norm(frame.p)) for frame in mechanism.frames]
         inertias = [(ROOT, mechanism.root)]

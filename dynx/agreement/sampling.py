@@ -168,26 +168,29 @@ def _share(budget: int, count: int, limit: int) -> int:
 
 def _configuration(model: Model, kind: Kind, rng: np.random.Generator) -> Floats:
     q = model.random(rng)
-    base = 7 if model.floating else 0
-    n = model.nq - base
-    lower, upper = _narrowed(model.lower[base:], model.upper[base:])
-    turning = np.array([joint.type != "prismatic" for joint in model.coordinate_joints], dtype=bool)
+    # Attitudes of ball joints are those of `random`.
+    joints = [joint for joint in model.coordinate_joints if joint.type != "ball"]
+    own = np.array([model.position_index(joint.name) for joint in joints], dtype=np.intp)
+    n = len(own)
+    lower, upper = _narrowed(model.lower[own], model.upper[own])
+    turning = np.array([joint.type != "prismatic" for joint in joints], dtype=bool)
     reach = np.where(turning, np.pi, 1.0)
     if kind == "within":
         limited = np.isfinite(lower) & np.isfinite(upper)
         drawn = rng.uniform(np.where(limited, lower, -reach), np.where(limited, upper, reach))
-        q[base:] = np.where(limited, drawn, q[base:])
+        q[own] = np.where(limited, drawn, q[own])
     elif kind == "anywhere":
-        q[base:] = rng.uniform(-reach, reach)
+        q[own] = rng.uniform(-reach, reach)
     elif kind == "straight":
-        q[base:] = np.where(turning, 0.5 * np.pi * rng.integers(-1, 3, n), 0.0)
+        q[own] = np.where(turning, 0.5 * np.pi * rng.integers(-1, 3, n), 0.0)
     elif kind == "limit":
         ends = np.where(rng.integers(0, 2, n) == 0, lower, upper)
-        q[base:] = np.where(np.isfinite(ends), ends, q[base:])
+        q[own] = np.where(np.isfinite(ends), ends, q[own])
     elif kind == "turns":
         many = 2.0 * np.pi * MAX_TURNS
-        q[base:] = np.where(turning, rng.uniform(-many, many, n), rng.uniform(-1.0, 1.0, n))
+        q[own] = np.where(turning, rng.uniform(-many, many, n), rng.uniform(-1.0, 1.0, n))
     # Half of the quaternions have a negative scalar; those of kind ``straight`` rotate by exactly pi.
-    if model.floating and kind == "straight":
-        q[3:7] = np.eye(4)[int(rng.integers(3))]
+    if kind == "straight":
+        for first in model.quaternions:
+            q[first : first + 4] = np.eye(4)[int(rng.integers(3))]
     return q

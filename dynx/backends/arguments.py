@@ -36,7 +36,8 @@ class Arguments:
         self.closed = False
         self._model = model
         self._floating = model.floating
-        self._q_shape = (model.nq,)
+        # No array has the shape None: the quaternions of ball joints are checked one by one.
+        self._q_shape = None if model.ball_joints else (model.nq,)
         self._v_shape = (model.nv,)
         self._listed = model.nq <= MAX_LISTED
 
@@ -50,7 +51,7 @@ class Arguments:
     # checked.
 
     def q(self, q: Any) -> Floats:
-        """Return a configuration (..., nq), finite, with a unit quaternion for a floating base."""
+        """Return a configuration (..., nq), finite, with unit quaternions of base and ball joints."""
         if self.closed:
             raise ClosedError(f"this backend of {self._model.name} was closed; make a new one")
         if type(q) is np.ndarray and q.dtype is _FLOAT64 and q.shape == self._q_shape:

@@ -26,6 +26,7 @@ class DerivedBackend(Backend):
     """
 
     name: ClassVar[str] = "derived"
+    takes_ball_joints: ClassVar[bool] = True  # where `inner` does
 
     @checks_types
     def __init__(self, inner: Backend, *, validate: bool = True) -> None:

@@ -36,6 +36,9 @@ class EngineHooks(ABC):
     vectorized: ClassVar[bool] = False
     """True if the hooks take leading batch axes."""
 
+    takes_ball_joints: ClassVar[bool] = False
+    """True if the hooks take robots with ball joints, whose q is longer than their v; others are refused."""
+
     compiles: ClassVar[bool] = False
     """True if every quantity is a kernel of dynx's own."""
 

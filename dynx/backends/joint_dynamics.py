@@ -23,7 +23,7 @@ class JointDynamicsTerms:
     the model."""
 
     def __init__(self, model: Model) -> None:
-        moving = [joint.dynamics for joint in model.joints if joint.moves]
+        moving = [joint.dynamics for joint in model.joints for _ in range(joint.n_rates)]
         base = [0.0] * (6 if model.floating else 0)
         self.damping = np.array(base + [d.damping for d in moving])
         self.friction = np.array(base + [d.friction for d in moving])
@@ -31,6 +31,7 @@ class JointDynamicsTerms:
         coupling = model.mechanism.coupling
         self._to_tree = None if coupling is None else coupling.matrix()
         self._tree_q = model.mechanism.tree_q
+        self._places = list(model.mechanism.places[6 if model.floating else 0 :])
         self.stiffness = np.array([d.stiffness for d in moving])
         self._references = np.array([d.spring_reference for d in moving])
         self.springs: JointSprings | None = None
@@ -58,7 +59,7 @@ class JointDynamicsTerms:
 
     def elastic_energy(self, q: Any) -> Floats:
         """Return the energy of the springs (...,) at q (..., nq) [J]."""
-        joints = self._tree_q(q)[..., -len(self.stiffness) :] if len(self.stiffness) else np.zeros(0)
+        joints = self._tree_q(q)[..., self._places]
         return np.asarray(0.5 * np.sum(self.stiffness * (joints - self._references) ** 2, axis=-1))
 
     def armature_torque(self, a: Any) -> Floats:

@@ -163,7 +163,7 @@ class JointFriction:
         numbers = coefficients_by_joint(model, name, given)
         coefficients = checked_gain(name, numbers, model.nv - base, per="one for each joint")
         # Given coefficients apply to joints that own a coordinate, not to the base or to mimic joints.
-        owners = [joint.mimic is None for joint in model.joints if joint.moves]
+        owners = [joint.mimic is None for joint in model.joints for _ in range(joint.n_rates)]
         joints = np.zeros(len(owners) if in_tree_coordinates else len(coefficients))
         joints[owners if in_tree_coordinates else slice(None)] = coefficients
         return np.concatenate([np.zeros(base), joints])
@@ -194,7 +194,9 @@ def coefficients_by_joint(
             column = model.coordinate_index(joint) - base
         except (UnknownNameError, DTypeError) as error:
             raise type(error)(f"{name}: {error}") from None
-        columns[column] = real_array(f"{name} of {shown(joint)}", value)
+        numbers = real_array(f"{name} of {shown(joint)}", value)
+        for axis in range(model.joint(joint).n_rates):
+            columns[column + axis] = numbers
     lengths = {column.shape for column in columns if column.shape}
     if len(lengths) > 1 or any(len(shape) > 1 for shape in lengths):
         raise GainError(f"{name} by joint: wanted one number for each joint, or one for each rollout")

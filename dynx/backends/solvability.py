@@ -125,7 +125,7 @@ def singular_coordinates(model: Model, joint_dynamics: bool = False) -> Singular
     base = 6 if model.floating else 0
 
     def names(numbers: set[int]) -> tuple[str, ...]:
-        each = ["base" if k < base else model.joint_names[k - base] for k in sorted(numbers)]
+        each = ["base" if k < base else model.coordinate_names[k - base] for k in sorted(numbers)]
         return tuple(dict.fromkeys(each))
 
     alone = names(massless)

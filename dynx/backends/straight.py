@@ -62,6 +62,8 @@ def straight_call(
     """
     if not validate:
         return _call_of_arrays_with_one_axis(hook, arguments, solves)
+    if model.ball_joints:
+        return _call_of_none
     entries_of_all = model.nq + (arguments - 1) * model.nv
     # An empty array may have two axes and no entry that shows it.
     if not model.nv or model.nq > MAX_LISTED or entries_of_all > MAX_LISTED_OF_ALL:
@@ -116,6 +118,10 @@ def straight_call(
         return None
 
     return (of_one, of_two, of_three)[arguments - 1]
+
+
+def _call_of_none(backend: object, arguments: tuple[Any, ...]) -> None:
+    """Leave the arguments to `Arguments`, which checks the quaternions of all ball joints."""
 
 
 def _binding_call_of_three(

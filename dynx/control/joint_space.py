@@ -29,6 +29,7 @@ from dynx.control.base import (
 )
 from dynx.control.saturation import checked_limit
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.numbers import checked_gain, positive_seconds
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats, clamp
@@ -41,6 +42,9 @@ class JointSpace(Controller[ControllerState]):
     """A controller that reads and moves joints alone; it commands no force on a floating base."""
 
     model: Model
+
+    def __post_init__(self) -> None:
+        refuse_ball_joints(self.model, "a controller")
 
     @property
     def n_joints(self) -> int:

@@ -69,6 +69,7 @@ from dynx.loaded import COMMON_VARIANTS, ENGINES, VARIANTS, engine_of, installed
 from dynx.loaded.difference import model_difference
 from dynx.loaded.robot import LoadedRobot, format_name
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.document_format import format_of_root
 from dynx.model.documents import bare_urdf
 from dynx.model.loading import read_description, read_model
@@ -578,6 +579,7 @@ def open_case(robot: Robot, base: Base | None, choices: Mapping[str, str]) -> Ca
     if case.form == "urdf":
         return case
     model = read_model(document.text_with_lines_before, document.source, base=base)
+    refuse_ball_joints(model, "the doctor")
     return replace(case, base=model.base)
 
 

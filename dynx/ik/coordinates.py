@@ -9,6 +9,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.spatial.scalar import Floats
 
 FULL_TURN = 2.0 * math.pi
@@ -37,6 +38,7 @@ class FrameCoordinates:
 
         Raises ArgumentError if it leaves a joint no range.
         """
+        refuse_ball_joints(model, "inverse kinematics")
         self._model = model
         self.floating = model.floating
         """Whether the first six coordinates are those of a floating base."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.ik.problem import Problem, Requirement
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.mechanism import joint_motion
 from dynx.model.model import Model
 from dynx.rbd.kinematics import ancestry
@@ -100,6 +101,7 @@ def _position_slack(requirement: Requirement) -> float:
 @lru_cache(maxsize=64)
 def frame_reach(model: Model, frame: str, point: tuple[float, float, float]) -> MaxReach:
     """Return the reach of a point (3,) [m] of a frame, in its axes, of a model with a fixed base."""
+    refuse_ball_joints(model, "inverse kinematics")
     mechanism = model.mechanism
     placed = mechanism.frames[model.frame_index(frame)]
     R, p = np.eye(3), np.zeros(3)

@@ -30,6 +30,7 @@ from dynx.ik.descent import ErrorCall, KernelTarget
 from dynx.ik.problem import checked_avoidance, checked_velocity_limit
 from dynx.ik.step import TargetKind
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_array, checked_vector, is_real, positive_seconds, real_array
 from dynx.model.targets import checked_targets
@@ -465,6 +466,7 @@ def velocity_ik(
     DTypeError, NotFiniteError) for an invalid argument.
     """
     model = backend.model
+    refuse_ball_joints(model, "inverse kinematics")
     seconds, time_limit = positive_seconds("dt", dt), TimeLimit(timeout)
     position = checked_q(model, q, "q")
     if position.ndim != 1:

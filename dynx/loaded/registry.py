@@ -14,6 +14,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import BackendError, RobotNotFoundError, UnknownBackendError, shown
 from dynx.loaded.robot import LoadedRobot
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.registry import ClassRegistry
 
 REGISTRY: ClassRegistry[LoadedRobot] = ClassRegistry(
@@ -76,6 +77,7 @@ def load_as(
             f"no file {shown(path)}; wanted the path of a file in URDF, MJCF or SDF, which "
             f"{shown(engine)} loads itself"
         )
+    refuse_ball_joints(model, "the comparison of files as engines load them")
     return loader_class(engine)(file, model, calls)
 
 

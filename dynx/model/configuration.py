@@ -21,6 +21,7 @@ from dynx.model.tree import Tree
 from dynx.spatial import branchless
 from dynx.spatial.branchless import FLOATS
 from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_product
 from dynx.time_limit import not_counted
 
 Step = Callable[[object, object, object], int]
@@ -38,9 +39,9 @@ to import."""
 
 
 def checked_q(tree: Tree, q: ArrayLike, name: str = "q") -> Floats:
-    """Return a configuration (..., nq), whose quaternion, if any, must have unit norm to 1e-6.
+    """Return a configuration (..., nq), whose quaternions, if any, must have unit norm to 1e-6.
 
-    If its norm deviates by more than rounding, the quaternion is normalised in a copy, since engines treat
+    If its norm deviates by more than rounding, a quaternion is normalised in a copy, since engines treat
     such quaternions differently.
     """
     try:
@@ -48,19 +49,23 @@ def checked_q(tree: Tree, q: ArrayLike, name: str = "q") -> Floats:
     except ShapeError as error:
         base = "position and quaternion (x, y, z, w) of the base, " if tree.floating else ""
         listed = ", ".join(map(shown, tree.joint_names[:8])) + ", ..." * (len(tree.joint_names) > 8)
-        raise ShapeError(f"{error}: {base}{listed}") from None
-    if not tree.floating:
-        return array
-    quat = array[..., 3:7]
-    unit = checked_quaternion(name, quat, "3:7")
-    return array if unit is quat else np.concatenate([array[..., :3], unit, array[..., 7:]], axis=-1)
+        balls = ", ".join(shown(joint.name) for joint in tree.ball_joints[:8])
+        of_balls = f", with a quaternion (x, y, z, w) of each ball joint: {balls}" if balls else ""
+        raise ShapeError(f"{error}: {base}{listed}{of_balls}") from None
+    for first in tree.quaternions:
+        quat = array[..., first : first + 4]
+        unit = checked_quaternion(name, quat, f"{first}:{first + 4}")
+        if unit is not quat:
+            array = np.concatenate([array[..., :first], unit, array[..., first + 4 :]], axis=-1)
+    return array
 
 
 def neutral(tree: Tree) -> Floats:
-    """Return the configuration (nq,) with every joint at 0 and the base frame at the world frame."""
+    """Return the configuration (nq,) with every joint at 0, or at the identity, and the base frame at the
+    world frame."""
     q = np.zeros(tree.nq)
-    if tree.floating:
-        q[6] = 1.0
+    for first in tree.quaternions:
+        q[first + 3] = 1.0
     return q
 
 
@@ -70,28 +75,51 @@ def random(
     """Sample configurations (*size, nq) uniformly within the limits.
 
     An angle without limits is in (-pi, pi), a length in (-1, 1). A floating base gets a position in the cube
-    [-1, 1]^3 and a uniformly distributed orientation (Shoemake 1992). `rng` is a NumPy generator or a seed.
+    [-1, 1]^3 and a uniformly distributed orientation (Shoemake 1992), a ball joint an orientation uniformly
+    distributed among those within its largest angle. `rng` is a NumPy generator or a seed.
     """
     rng = checked_generator(rng)
     shape = checked_size(size)
     q = np.empty((*shape, tree.nq))
-    base = 7 if tree.floating else 0
-    for k, joint in enumerate(tree.coordinate_joints, start=base):
+    for joint in tree.coordinate_joints:
+        k = tree.position_index(joint.name)
+        if joint.type == "ball":
+            q[..., k : k + 4] = _random_rotation(rng, shape, joint.limits.upper)
+            continue
         default_range = 1.0 if joint.type == "prismatic" else np.pi
         low, high = sampling_range(float(tree.lower[k]), float(tree.upper[k]), default_range)
         q[..., k] = rng.uniform(low, high, shape)
     if tree.floating:
         q[..., :3] = rng.uniform(-1.0, 1.0, (*shape, 3))
-        quat = rng.standard_normal((*shape, 4))
-        q[..., 3:7] = quat / np.linalg.norm(quat, axis=-1, keepdims=True)
+        q[..., 3:7] = _random_rotation(rng, shape, np.inf)
     return q
+
+
+def _random_rotation(rng: np.random.Generator, shape: tuple[int, ...], largest_angle: float) -> Floats:
+    """Sample unit quaternions (*shape, 4) uniformly among the rotations by at most `largest_angle` [rad]."""
+    quat = rng.standard_normal((*shape, 4))
+    if largest_angle >= np.pi:
+        return np.asarray(quat / np.linalg.norm(quat, axis=-1, keepdims=True))
+    # The share of rotations by less than an angle x is proportional to x - sin x.
+    share = rng.uniform(0.0, largest_angle - np.sin(largest_angle), shape)
+    low, high = np.zeros(shape), np.full(shape, largest_angle)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        above = middle - np.sin(middle) > share
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    axis = quat[..., :3] / np.linalg.norm(quat[..., :3], axis=-1, keepdims=True)
+    half = 0.5 * low[..., None]
+    return np.concatenate([axis * np.sin(half), np.cos(half)], axis=-1)
 
 
 def integrate(tree: Tree, q: ArrayLike, v: ArrayLike) -> Floats:
     """Return the configuration reached from `q` (..., nq) with velocity `v` (..., nv) in unit time.
 
-    A floating base moves along the exponential of its body twist.
+    A floating base moves along the exponential of its body twist, and a ball joint turns along that of its
+    angular velocity.
     """
+    if tree.ball_joints:
+        return _integrate_parts(tree, q, v)
     if tree.floating and type(q) is type(v) is np.ndarray:
         moved = np.empty(tree.nq)
         if _integration.function(q, v, moved) == _ACCEPTED:
@@ -106,7 +134,9 @@ def integrate(tree: Tree, q: ArrayLike, v: ArrayLike) -> Floats:
 
 
 def difference(tree: Tree, q0: ArrayLike, q1: ArrayLike) -> Floats:
-    """Return the velocity v (..., nv) with integrate(q0, v) = q1, whose rotation angle is at most pi."""
+    """Return the velocity v (..., nv) with integrate(q0, v) = q1, whose rotation angles are at most pi."""
+    if tree.ball_joints:
+        return _subtract_parts(tree, q0, q1)
     if tree.floating and type(q0) is type(q1) is np.ndarray:
         velocity = np.empty(tree.nv)
         if _subtraction.function(q0, q1, velocity) == _ACCEPTED:
@@ -120,14 +150,60 @@ def difference(tree: Tree, q0: ArrayLike, q1: ArrayLike) -> Floats:
     return np.array(branchless.twist_between(start[:7], end[:7], FLOATS) + list(map(sub, end[7:], start[7:])))
 
 
-def clip(tree: Tree, q: ArrayLike) -> Floats:
-    """Return `q` (..., nq) clipped to the position limits, with a normalised quaternion."""
-    array = np.clip(checked_array("q", q, tree.nq), tree.lower, tree.upper)
+def _integrate_parts(tree: Tree, q: ArrayLike, v: ArrayLike) -> Floats:
+    """Return `integrate` for a robot with ball joints: the base, then joint by joint."""
+    q, v = _broadcast(checked_q(tree, q), checked_array("v", v, tree.nv))
+    parts, in_q, in_v = [], 0, 0
     if tree.floating:
-        norm = np.linalg.norm(array[..., 3:7], axis=-1, keepdims=True)
+        parts, in_q, in_v = [branchless.integrate(q[..., :7], v[..., :6])], 7, 6
+    for joint in tree.coordinate_joints:
+        of_q, of_v = q[..., in_q : in_q + joint.n_positions], v[..., in_v : in_v + joint.n_rates]
+        if joint.type == "ball":
+            turned = quat_product(of_q, branchless.quat_exp(of_v))
+            parts.append(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
+        else:
+            parts.append(of_q + of_v)
+        in_q, in_v = in_q + joint.n_positions, in_v + joint.n_rates
+    return np.concatenate(parts, axis=-1)
+
+
+def _subtract_parts(tree: Tree, q0: ArrayLike, q1: ArrayLike) -> Floats:
+    """Return `difference` for a robot with ball joints: the base, then joint by joint."""
+    q0, q1 = _broadcast(checked_q(tree, q0, "q0"), checked_q(tree, q1, "q1"))
+    parts, at = [], 0
+    if tree.floating:
+        parts, at = [branchless.difference(q0[..., :7], q1[..., :7])], 7
+    for joint in tree.coordinate_joints:
+        start, end = (q[..., at : at + joint.n_positions] for q in (q0, q1))
+        if joint.type == "ball":
+            back = np.concatenate([-start[..., :3], start[..., 3:]], axis=-1)
+            parts.append(branchless.quat_log(quat_product(back, end)))
+        else:
+            parts.append(end - start)
+        at += joint.n_positions
+    return np.concatenate(parts, axis=-1)
+
+
+def clip(tree: Tree, q: ArrayLike) -> Floats:
+    """Return `q` (..., nq) clipped to the position limits, with normalised quaternions.
+
+    A ball joint beyond its largest angle is turned back about the same axis.
+    """
+    array = np.clip(checked_array("q", q, tree.nq), tree.lower, tree.upper)
+    for first in tree.quaternions:
+        quat = array[..., first : first + 4]
+        norm = np.linalg.norm(quat, axis=-1, keepdims=True)
         if np.any(norm == 0.0):
-            raise ArgumentError("q[3:7] is the zero quaternion; wanted an attitude")
-        array[..., 3:7] /= norm
+            raise ArgumentError(f"q[{first}:{first + 4}] is the zero quaternion; wanted an attitude")
+        quat /= norm
+    for joint in tree.ball_joints:
+        if joint.limits.upper < np.pi:
+            first = tree.position_index(joint.name)
+            rotation = branchless.quat_log(array[..., first : first + 4])
+            angle = np.linalg.norm(rotation, axis=-1, keepdims=True)
+            beyond = angle > joint.limits.upper
+            kept = branchless.quat_exp(rotation * (joint.limits.upper / np.where(beyond, angle, 1.0)))
+            array[..., first : first + 4] = np.where(beyond, kept, array[..., first : first + 4])
     return array
 
 

@@ -7,7 +7,7 @@ Values are those of the file, in SI units; inertias are neither merged nor diago
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import chain
 from typing import Any, Literal, NamedTuple
@@ -28,7 +28,7 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy, rpy_from_rotation
 
-JointType = Literal["revolute", "continuous", "prismatic", "fixed"]
+JointType = Literal["revolute", "continuous", "prismatic", "ball", "fixed"]
 Vector = tuple[float, float, float]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -203,7 +203,11 @@ class Link:
 
 @dataclass(frozen=True)
 class Limits:
-    """Range of a joint position [rad or m], largest speed [rad/s or m/s] and largest effort [N m or N]."""
+    """Range of a joint position [rad or m], largest speed [rad/s or m/s] and largest effort [N m or N].
+
+    `upper` of a ball joint is its largest angle of rotation [rad], whatever the axis, and `lower` is 0; speed
+    and effort are those about each axis of the child.
+    """
 
     lower: float = -INFINITY
     upper: float = INFINITY
@@ -217,7 +221,8 @@ class JointDynamics:
     `Backend`).
 
     The spring pulls with ``-stiffness (q - spring_reference)``; `stiffness` is in N m/rad or N/m,
-    `spring_reference` in rad or m, and 0 for a joint without a spring, where it means nothing.
+    `spring_reference` in rad or m, and 0 for a joint without a spring, where it means nothing. The other
+    three of a ball joint act about each axis of its child; a ball joint has no spring.
     """
 
     damping: float = 0.0
@@ -237,11 +242,19 @@ class JointSprings(NamedTuple):
     stiffness: Array
     preload: Array
     """Torque with which the springs pull at position 0 [N m or N]."""
+    places: tuple[int, ...] | None = None
+    """Index in q of each coordinate, in a robot with ball joints; otherwise they are the last ones of q."""
+
+    def positions(self, q: Array) -> Array:
+        """Return the position (..., nv) of each coordinate in q (..., nq), and any number for those without
+        stiffness: base and ball joints."""
+        if self.places is not None:
+            return np.asarray(q[..., list(self.places)])
+        return np.asarray(q[..., q.shape[-1] - self.stiffness.shape[-1] :])
 
     def torque(self, q: Array) -> Array:
         """Return the torque (..., nv) with which the springs pull at q (..., nq)."""
-        # The positions of the joints are the last ones; those of a base have no stiffness.
-        return np.asarray(self.preload - self.stiffness * q[..., q.shape[-1] - self.stiffness.shape[-1] :])
+        return np.asarray(self.preload - self.stiffness * self.positions(q))
 
 
 class JointCoefficients(NamedTuple):
@@ -275,10 +288,10 @@ class Joint:
     """A joint from link `parent` to link `child`; `origin` is the pose of its frame in the parent at position
     0.
 
-    `axis` is a unit vector in the joint frame. `locked_at` is the position at which a movable joint was
-    locked; its type is then ``fixed`` and `origin` includes that position. A joint that is fixed without that
-    has the default axis, limits, dynamics and mimic, whatever is given: they mean nothing there, and no file
-    has them.
+    `axis` is a unit vector in the joint frame; that of a ball joint is the default. `locked_at` is the
+    position at which a movable joint was locked; its type is then ``fixed`` and `origin` includes that
+    position. A joint that is fixed without that has the default axis, limits, dynamics and mimic, whatever
+    is given: they mean nothing there, and no file has them.
     """
 
     name: str
@@ -298,11 +311,25 @@ class Joint:
             for each in fields(self):
                 if each.name in ("axis", "limits", "dynamics", "mimic"):
                     object.__setattr__(self, each.name, each.default)
+        elif self.type == "ball":
+            object.__setattr__(self, "axis", (1.0, 0.0, 0.0))
+            object.__setattr__(self, "limits", replace(self.limits, lower=0.0))
 
     @property
     def moves(self) -> bool:
         """True if the joint can move, independently or by following another."""
         return self.type != "fixed"
+
+    @property
+    def n_positions(self) -> int:
+        """Number of entries of q: 4 of a ball joint, whose position is a unit quaternion (x, y, z, w)."""
+        return 4 if self.type == "ball" else int(self.moves)
+
+    @property
+    def n_rates(self) -> int:
+        """Number of entries of v: 3 of a ball joint, the angular velocity of the child relative to the
+        parent, in the axes of the child."""
+        return 3 if self.type == "ball" else int(self.moves)
 
     @property
     def unit(self) -> Literal["rad", "m"]:

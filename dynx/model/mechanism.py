@@ -5,6 +5,12 @@ the backend `reference` and in 50 digits for the referee.
 
 A mechanism has its own *tree coordinates*: one for each moving joint, mimic joints included, after the six of
 a floating base. `Coupling` maps the coordinates of the model to them.
+
+A ball joint is three bodies at one place, of which the last is its child and the others have no mass. The
+first has the whole rotation of the joint, and body k rotates about axis k of the child with entry k of its
+angular velocity. Axes, velocities and inertias are then those of three revolute joints, and algorithms treat
+them so, with one exception: the axes of all three move with the child (`Mechanism.axis_carriers`), so
+accelerations differ by `rate_products`.
 """
 
 from __future__ import annotations
@@ -17,11 +23,11 @@ from typing import Any
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.model.elements import IDENTITY, JointSprings, Pose
+from dynx.model.elements import IDENTITY, JointSprings, Pose, Vector
 from dynx.model.tree import Tree
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
 from dynx.spatial.scalar import Array, Floats, sqrt
-from dynx.spatial.so3 import rotate, rotation_about, rotation_from_rpy
+from dynx.spatial.so3 import rotate, rotation_about, rotation_from_quat, rotation_from_rpy
 
 ScalarConverter = Callable[[object], Array]
 """Function that converts nested floats to an array of the scalar type in use."""
@@ -40,7 +46,8 @@ class Body:
     """A rigid body and the joint of one degree of freedom that connects it to its parent.
 
     The body frame is that of the joint's child link. (R, p) is the pose of the joint frame, at position 0, in
-    the body frame of the parent; `axis` is the unit axis in the joint frame.
+    the body frame of the parent; `axis` is the unit axis in the joint frame. `ball` is the number, 0 to 2,
+    of the axis among those of a ball joint.
     """
 
     joint: str
@@ -50,11 +57,12 @@ class Body:
     p: Array
     axis: Array
     inertia: RigidInertia
+    ball: int | None = None
 
     @property
     def about_z(self) -> bool:
         """True if the body rotates about the z axis of its joint frame; False if it stands for several."""
-        return self.revolute and self.axis.ndim == 1 and all(self.axis == (0, 0, 1))
+        return self.revolute and self.ball is None and self.axis.ndim == 1 and all(self.axis == (0, 0, 1))
 
 
 @dataclass(frozen=True)
@@ -143,7 +151,48 @@ class Mechanism:
         first: dict[int, int] = {}
         for number, frame in enumerate(self.frames):
             first.setdefault(frame.body, number)
-        return tuple(first[body] for body in range(ROOT, len(self.bodies)))
+        return tuple(first[body] for body in (ROOT, *self.axis_carriers))
+
+    @cached_property
+    def axis_carriers(self) -> tuple[int, ...]:
+        """Number of the body with which the axis of each body's joint moves: the body itself, or the child of
+        a ball joint."""
+        return tuple(k if body.ball is None else k + 2 - body.ball for k, body in enumerate(self.bodies))
+
+    @cached_property
+    def balls(self) -> tuple[int, ...]:
+        """Number of the first of the three bodies of each ball joint."""
+        return tuple(k for k, body in enumerate(self.bodies) if body.ball == 0)
+
+    def rate_products(self, v: Array) -> Array:
+        """Return by how much accelerations (..., nv) of ball joints exceed those of three joints in a row
+        with the same motion, at the tree velocity v (..., nv); zero for other coordinates.
+
+        It is the sum of e_i x e_j w_i w_j over i < j, with the angular velocity w of a ball joint in the axes
+        e of its child: of three joints in a row, joint i carries the axis of joint j.
+        """
+        columns = [0 * v[..., k] for k in range(v.shape[-1])]
+        for ball in self.balls:
+            first = v.shape[-1] - len(self.bodies) + ball
+            x, y, z = (v[..., first + k] for k in range(3))
+            columns[first : first + 3] = [y * z, -(x * z), x * y]
+        return np.stack(columns, axis=-1)
+
+    def joint_entries(self, x: Array) -> list[Array]:
+        """Return the entries (...,) for each body's joint of a tree configuration or velocity (..., n); those
+        of a ball joint in a configuration are its quaternion (..., 4)."""
+        end, n = x.shape[-1], len(self.bodies)
+        if not self.balls or end != self.nq:
+            return [np.asarray(x[..., k]) for k in range(end - n, end)]
+        entries, at = [], 7 if self.floating else 0
+        for body in self.bodies:
+            if body.ball is None:
+                entries.append(np.asarray(x[..., at]))
+                at += 1
+            else:
+                entries.append(np.asarray(x[..., at : at + 4]))
+                at += 4 * (body.ball == 2)
+        return entries
 
     @cached_property
     def has_mass(self) -> bool:
@@ -161,7 +210,17 @@ class Mechanism:
             preload = (preload - stiffness * np.array(self.coupling.offset)) @ S
             stiffness = stiffness @ S**2
         base = np.zeros((*stiffness.shape[:-1], 6 if self.floating else 0))
-        return JointSprings(*(np.concatenate([base, each], axis=-1) for each in (stiffness, preload)))
+        stiffness, preload = (np.concatenate([base, each], axis=-1) for each in (stiffness, preload))
+        return JointSprings(stiffness, preload, self.places if self.balls else None)
+
+    @cached_property
+    def places(self) -> tuple[int, ...]:
+        """Index in q of each coordinate of the tree; of a ball joint and of a base, that of a number of its."""
+        places, at = [*range(6)] if self.floating else [], 7 if self.floating else 0
+        for body in self.bodies:
+            places.append(at)
+            at += 1 if body.ball is None else 4 * (body.ball == 2)
+        return tuple(places)
 
     @property
     def root_center(self) -> Array:
@@ -179,7 +238,7 @@ class Mechanism:
     @property
     def nq(self) -> int:
         """Number of tree positions."""
-        return len(self.bodies) + (7 if self.floating else 0)
+        return len(self.bodies) + len(self.balls) + (7 if self.floating else 0)
 
     def tree_q(self, q: Floats) -> Floats:
         """Convert a model configuration (..., nq) to a tree configuration: with the mimic joints."""
@@ -208,17 +267,26 @@ def build_mechanism(tree: Tree, convert: ScalarConverter = float64) -> Mechanism
     at_root = identity if tree.base_pose == IDENTITY else pose_arrays(tree.base_pose, convert)
     placed: dict[str, tuple[int, Array, Array]] = {tree.root: (ROOT, *at_root)}
     moving: list[tuple[str, int, bool, Array, Array]] = []
+    axes_given: list[Vector] = []
+    balls: dict[int, int] = {}
     rotations, positions = stacked_poses([joint.origin for joint in tree.joints], convert)
     for joint, R_joint, p_joint in zip(tree.joints, rotations, positions, strict=True):
         body, R_parent, p_parent = placed[joint.parent]
         R, p = R_parent @ R_joint, p_parent + rotate(R_parent, p_joint)
         if joint.moves:
             moving.append((joint.name, body, joint.type != "prismatic", R, p))
+            if joint.type == "ball":
+                first = len(moving) - 1
+                moving += [(joint.name, first + k, True, *identity) for k in range(2)]
+                balls |= {first + k: k for k in range(3)}
+                axes_given += [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+            else:
+                axes_given.append(joint.axis)
             placed[joint.child] = (len(moving) - 1, *identity)
         else:
             placed[joint.child] = (body, R, p)
     # An axis has unit norm only to float64 rounding; normalise it in the scalar type in use.
-    axes = convert([joint.axis for joint in tree.joints if joint.moves]).reshape(-1, 3)
+    axes = convert(axes_given).reshape(-1, 3)
     axes = axes / sqrt(np.sum(axes * axes, axis=-1))[:, None]
 
     massless = RigidInertia(convert(0.0), convert(np.zeros(3)), convert(np.zeros((3, 3))))
@@ -254,7 +322,8 @@ def build_mechanism(tree: Tree, convert: ScalarConverter = float64) -> Mechanism
         gravity=convert(tree.gravity),
         root=merged[ROOT],
         bodies=tuple(
-            Body(*fields, axis, merged[k]) for k, (fields, axis) in enumerate(zip(moving, axes, strict=True))
+            Body(*fields, axis, merged[k], balls.get(k))
+            for k, (fields, axis) in enumerate(zip(moving, axes, strict=True))
         ),
         frames=tuple(frames),
         coupling=_coupling(tree),
@@ -268,8 +337,11 @@ def _stacked(placements: Sequence[tuple[int, Array, Array]]) -> tuple[Array, Arr
 
 
 def joint_motion(body: Body, value: Array) -> tuple[Array, Array]:
-    """Return (R, p) of the body frame in its parent's body frame at joint position `value` (...,)."""
+    """Return (R, p) of the body frame in its parent's body frame at joint position `value` (...,), of a ball
+    joint (..., 4)."""
     value = np.asarray(value)
+    if body.ball is not None:
+        return (body.R @ rotation_from_quat(value), body.p) if body.ball == 0 else (body.R, body.p)
     if body.revolute:
         return body.R @ rotation_about(body.axis, value), body.p
     return body.R, body.p + rotate(body.R, body.axis * value[..., None])

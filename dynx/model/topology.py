@@ -9,7 +9,15 @@ from typing import SupportsFloat
 
 import numpy as np
 
-from dynx.errors import DescriptionError, DTypeError, NotFiniteError, UnknownNameError, nearest, shown
+from dynx.errors import (
+    DescriptionError,
+    DTypeError,
+    NotFiniteError,
+    UnknownNameError,
+    UnsupportedFeatureError,
+    nearest,
+    shown,
+)
 from dynx.model.elements import Inertial, Joint, Link, Mimic, Note, Pose
 from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.spatial.so3 import rotation_about, rpy_from_rotation
@@ -30,6 +38,13 @@ def refuse_unbounded_numbers(links: Iterable[Link], joints: Iterable[Joint], sou
             _require_bounded(f"link {shown(link.name)}", _of_inertial(link.inertial), source, link.line)
     for joint in joints:
         _require_bounded(f"joint {shown(joint.name)}", _of_joint(joint), source, joint.line)
+        if joint.type == "ball" and not joint.limits.upper >= 0.0:
+            raise DescriptionError(
+                f"the largest angle of ball joint {shown(joint.name)} is {joint.limits.upper}; wanted at "
+                "least 0",
+                source=source,
+                line=joint.line,
+            )
 
 
 def _of_inertial(inertial: Inertial) -> Iterator[tuple[str, float]]:
@@ -85,6 +100,10 @@ def lock_joints(joints: list[Joint], lock: Mapping[str, float]) -> list[Joint]:
             raise UnknownNameError(f"cannot lock {shown(name)}: no such joint{nearest(name, by_name)}")
         if not by_name[name].moves:
             raise UnknownNameError(f"cannot lock {shown(name)}: it is a fixed joint already")
+        if by_name[name].type == "ball":
+            raise UnsupportedFeatureError(
+                f"cannot lock {shown(name)}: it is a ball joint, whose position is no number"
+            )
         if isinstance(value, bool | str) or not isinstance(value, SupportsFloat):
             raise DTypeError(f"cannot lock {shown(name)} at {shown(value)}; wanted a number")
         if not math.isfinite(value):
@@ -188,6 +207,15 @@ def resolve_mimics(joints: list[Joint], notes: list[Note], source: str) -> list[
     independent, with a note. Raises DescriptionError for a cycle of mimic joints.
     """
     by_name = {joint.name: joint for joint in joints}
+    balls = [joint for joint in joints if joint.type == "ball"]
+    followers = [joint for joint in joints if joint.moves and joint.mimic is not None]
+    if balls and followers:
+        raise UnsupportedFeatureError(
+            f"joint {shown(followers[0].name)} mimics another, and {shown(balls[0].name)} is a ball joint; "
+            "dynx takes no robot with both",
+            source=source,
+            line=followers[0].line,
+        )
     resolved: dict[str, Joint] = {}
     for joint in joints:
         for follower in reversed(_unresolved_chain(joint, by_name, resolved, source)):

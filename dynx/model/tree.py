@@ -26,7 +26,7 @@ class Tree:
     """Links and joints in depth-first order, the base and gravity; `Model` adds what is computed from them.
 
     Coordinates (`q`, `v`) list the moving joints in the order of `joint_names`, after those of a floating
-    base.
+    base. A ball joint has four entries of q, a unit quaternion (x, y, z, w), and three of v.
     """
 
     name: str
@@ -55,13 +55,47 @@ class Tree:
 
     @cached_property
     def coordinate_joints(self) -> tuple[Joint, ...]:
-        """Joints with a coordinate of their own: they move and follow no other joint."""
+        """Joints with coordinates of their own: they move and follow no other joint."""
         return tuple(joint for joint in self.joints if joint.moves and joint.mimic is None)
 
     @cached_property
+    def ball_joints(self) -> tuple[Joint, ...]:
+        """Joints whose position is a quaternion."""
+        return tuple(joint for joint in self.joints if joint.type == "ball")
+
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the coordinates, in order; name k belongs to ``v[k]``, after the 6 of a floating base."""
+        """Names of the joints with coordinates, in order; without ball joints, name k belongs to ``v[k]``,
+        after the 6 of a floating base."""
         return tuple(joint.name for joint in self.coordinate_joints)
+
+    @cached_property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """Names of the entries of v, after the 6 of a floating base: those of the joints, and of a ball joint
+        three, with the axes ``.x``, ``.y`` and ``.z`` of its child."""
+        return tuple(
+            name
+            for joint in self.coordinate_joints
+            for name in ([f"{joint.name}.{axis}" for axis in "xyz"] if joint.type == "ball" else [joint.name])
+        )
+
+    @cached_property
+    def position_names(self) -> tuple[str, ...]:
+        """Names of the entries of q, after the 7 of a floating base: as `coordinate_names`, and of a ball
+        joint four, with the components ``.qx``, ``.qy``, ``.qz`` and ``.qw`` of its quaternion."""
+        return tuple(
+            name
+            for joint in self.coordinate_joints
+            for name in (
+                [f"{joint.name}.q{part}" for part in "xyzw"] if joint.type == "ball" else [joint.name]
+            )
+        )
+
+    @cached_property
+    def quaternions(self) -> tuple[int, ...]:
+        """Index in q at which each quaternion begins: that of a floating base, then those of ball joints."""
+        balls = [self.position_index(joint.name) for joint in self.ball_joints]
+        return tuple([3] * self.floating + balls)
 
     @cached_property
     def frames(self) -> tuple[Frame, ...]:
@@ -86,12 +120,12 @@ class Tree:
     @cached_property
     def nq(self) -> int:
         """Length of a configuration `q`."""
-        return len(self.coordinate_joints) + (7 if self.floating else 0)
+        return sum(joint.n_positions for joint in self.coordinate_joints) + (7 if self.floating else 0)
 
     @cached_property
     def nv(self) -> int:
         """Length of a velocity `v`, an acceleration `a` and a torque `tau`."""
-        return len(self.coordinate_joints) + (6 if self.floating else 0)
+        return sum(joint.n_rates for joint in self.coordinate_joints) + (6 if self.floating else 0)
 
     @cached_property
     def total_mass(self) -> float:
@@ -112,21 +146,33 @@ class Tree:
 
     @checks_types
     def coordinate_index(self, joint: str) -> int:
-        """Return the index of the joint's coordinate in `v` (one higher in `q` with a floating base)."""
-        offset = 6 if self.floating else 0
-        if joint in self.joint_names:
-            return offset + self.joint_names.index(joint)
+        """Return the index in `v` of the joint's coordinate, of a ball joint the first of three.
+
+        Without ball joints before it, the index in `q` is the same, or one higher with a floating base
+        (`position_index`).
+        """
+        if joint in self._first_indices:
+            return self._first_indices[joint][1]
         found = self.joint(joint)
         why = "it is locked" if found.locked_at is not None else "it is fixed"
         if found.mimic is not None:
             why = f"it follows {shown(found.mimic.joint)}"
         raise UnknownNameError(f"joint {shown(joint)} of {self.name} has no coordinate: {why}")
 
+    @checks_types
+    def position_index(self, joint: str) -> int:
+        """Return the index in `q` of the joint's position, of a ball joint the first of four.
+
+        Raises UnknownNameError as `coordinate_index` does."""
+        if joint not in self._first_indices:
+            self.coordinate_index(joint)
+        return self._first_indices[joint][0]
+
     # -- limits ------------------------------------------------------------------------------
 
     @cached_property
     def lower(self) -> Floats:
-        """Lower position limits (nq,); -inf for a continuous joint and for a floating base."""
+        """Lower position limits (nq,); -inf for a continuous joint, a ball joint and a floating base."""
         return self._position_limits[0]
 
     @cached_property
@@ -138,13 +184,15 @@ class Tree:
     def velocity_limit(self) -> Floats:
         """Largest speed of each coordinate (nv,) [rad/s or m/s], inf for no limit."""
         base = [np.inf] * (6 if self.floating else 0)
-        return np.array(base + [joint.limits.velocity for joint in self.coordinate_joints])
+        joints = self.coordinate_joints
+        return np.array(base + [each.limits.velocity for each in joints for _ in range(each.n_rates)])
 
     @cached_property
     def effort_limit(self) -> Floats:
         """Largest effort of each coordinate (nv,) [N m or N], inf for no limit."""
         base = [np.inf] * (6 if self.floating else 0)
-        return np.array(base + [joint.limits.effort for joint in self.coordinate_joints])
+        joints = self.coordinate_joints
+        return np.array(base + [each.limits.effort for each in joints for _ in range(each.n_rates)])
 
     def inertial(self, link: str) -> Inertial:
         """Return the inertial of a link; a link without one has no mass."""
@@ -155,12 +203,14 @@ class Tree:
         """Lower and upper limits, each (nq,): each joint's own, narrowed by those of joints that mimic it.
 
         If the lower limit in the file exceeds the upper one, the two are exchanged (the reader adds a note).
-        If the limits of a follower leave no range for its driver, the driver's own limits apply.
+        If the limits of a follower leave no range for its driver, the driver's own limits apply. The entries
+        of a quaternion have none: the angle of a ball joint is limited (`Limits`).
         """
-        base = 7 if self.floating else 0
         lower, upper = np.full(self.nq, -np.inf), np.full(self.nq, np.inf)
-        index = {name: base + k for k, name in enumerate(self.joint_names)}
+        index = {name: first for name, (first, _) in self._first_indices.items()}
         for joint in self.coordinate_joints:
+            if joint.type == "ball":
+                continue
             k = index[joint.name]
             lower[k] = min(joint.limits.lower, joint.limits.upper)
             upper[k] = max(joint.limits.lower, joint.limits.upper)
@@ -177,6 +227,15 @@ class Tree:
                 lower[k], upper[k] = low, high
         # Adding 0.0 turns -0.0 into 0.0: NumPy's generator rejects the range from 0.0 to -0.0.
         return lower + 0.0, upper + 0.0
+
+    @cached_property
+    def _first_indices(self) -> dict[str, tuple[int, int]]:
+        """Index in q and in v at which each joint with coordinates begins."""
+        found, in_q, in_v = {}, 7 if self.floating else 0, 6 if self.floating else 0
+        for joint in self.coordinate_joints:
+            found[joint.name] = in_q, in_v
+            in_q, in_v = in_q + joint.n_positions, in_v + joint.n_rates
+        return found
 
     @cached_property
     def _joint_by_name(self) -> dict[str, Joint]:

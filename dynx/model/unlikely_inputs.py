@@ -26,9 +26,9 @@ MAX_JOINTS = 3
 def position_notes(model: Tree, q: Floats, name: str = "q") -> Iterator[str]:
     """Yield a sentence for each joint whose position in q (nq,) is far beyond its limits, with what the
     number would be in the unit that was perhaps meant. `name` is that of the configuration."""
-    base = 7 if model.floating else 0
     found = []
-    for k, joint in enumerate(model.coordinate_joints, start=base):
+    for joint in model.coordinate_joints:
+        k = model.position_index(joint.name)
         x, lower, upper = float(q[k]), float(model.lower[k]), float(model.upper[k])
         if joint.type in FAR and not lower - FAR[joint.type] <= x <= upper + FAR[joint.type]:
             meant = in_other_unit(joint, x, lower, upper)

@@ -134,7 +134,8 @@ def forward_dynamics(
     _, a = loops.outward(_accelerate, base, passed, eliminated)
     if mechanism.floating:
         base = loops.root(_without_gravity, root, base)
-    return loops.vector(base, a, like=v)
+    found = loops.vector(base, a, like=v)
+    return found + mechanism.rate_products(v) if mechanism.balls else found
 
 
 def _root_motion(mechanism: Mechanism, q: Array, v: Array) -> LocalMotion:

@@ -172,7 +172,10 @@ def _matrix(loops: Loops, placements: Sequence[Placement], v: Array) -> Array:
     rigid = [loops.root(_root_composite, omegas[0]), *loops.each(_rigid_composite, omegas)]
     composites = loops.subtrees(_add_composite, rigid, steps)
     base = loops.root(_base_subspace, omegas[0], stored=False)
-    subspaces = loops.each(_joint_subspace, omegas, stored=False)
+    of_axes: Sequence[Array] = omegas
+    if loops.mechanism.balls:
+        of_axes = [omegas[body + 1] for body in loops.mechanism.axis_carriers]
+    subspaces = loops.each(_joint_subspace, of_axes, stored=False)
     C = loops.matrices(1, like=v)
     loops.base_block(C, _base_block, composites[0], base)
     loops.to_root(

@@ -27,6 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dynx.errors import UnsupportedFeatureError
 from dynx.model.mechanism import Body, Mechanism
 from dynx.rbd.loops import Loops, PythonLoops
 from dynx.rbd.placement import Placement, SpatialVector
@@ -135,6 +136,10 @@ def inverse_dynamics_derivatives(
 
     With a floating base the derivative by q is the one by a displacement in the axes of the base.
     """
+    if mechanism.balls:
+        raise UnsupportedFeatureError(
+            f"{mechanism.name} has a ball joint, of which there are no derivatives in closed form"
+        )
     loops = loops or PythonLoops(mechanism)
     if mechanism.floating:
         base = loops.root(Base.of, q, v)

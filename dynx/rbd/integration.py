@@ -18,6 +18,7 @@ import numpy as np
 
 from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.spatial.branchless import quat_exp
 from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import cross, quat_product, rotate, rotate_back, rotation_from_quat
@@ -58,6 +59,7 @@ class SemiImplicitEuler:
 
     def __init__(self, model: Model, h: float, center: Array | None = None) -> None:
         """`center` (3,) [m] is the centre of mass of the root, by default that of `model`."""
+        refuse_ball_joints(model, "an integrator")
         self._floating = model.floating
         self._h: Array = np.full(model.nv, h)
         self._step = h
@@ -93,6 +95,7 @@ class ExplicitEuler:
     """
 
     def __init__(self, model: Model, h: float) -> None:
+        refuse_ball_joints(model, "an integrator")
         if model.floating:
             raise UnsupportedFeatureError("the integrator euler is for robots with a fixed base")
         self._h = h
@@ -107,6 +110,7 @@ class Flow:
     """Time derivative of the state y = (q, v); between steps its quaternion need not be of unit length."""
 
     def __init__(self, model: Model) -> None:
+        refuse_ball_joints(model, "an integrator")
         self._floating = model.floating
         self.nq = model.nq
 

@@ -55,7 +55,7 @@ def frame_jacobian_derivative(
     linear, angular = _world_columns(mechanism, poses, body, p)
     d_linear, d_angular = [0 * column for column in linear], [0 * column for column in angular]
     for column, z, o, owner in moving_columns(mechanism, poses, body):
-        o_velocity, o_omega = twists[owner]
+        o_velocity, o_omega = twists[ROOT if owner == ROOT else mechanism.axis_carriers[owner]]
         dz = cross(o_omega, z)
         if is_rotation(mechanism, column, owner):
             d_linear[column] = cross(dz, p - o) + cross(z, velocity - o_velocity)

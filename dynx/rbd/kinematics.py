@@ -44,7 +44,7 @@ class BodyVectors:
 
 
 def joint_value(mechanism: Mechanism, x: Array, body: int) -> Array:
-    """Return the entry (...,) for the body's joint of a tree configuration or velocity (..., n)."""
+    """Return the entry (...,) for the body's joint of a tree velocity (..., nv)."""
     return np.asarray(x[..., x.shape[-1] - len(mechanism.bodies) + body])
 
 

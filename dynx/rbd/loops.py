@@ -270,15 +270,14 @@ class PythonLoops(Loops):
         return np.stack(joints, axis=-1) if joints else np.zeros(like.shape)
 
     def _rows(self, columns: Columns) -> Sequence[Sequence[Any]]:
-        """Return the values of columns for every body; the last entries of arrays are those of the joints."""
+        """Return the values of columns for every body; arrays are configurations or velocities."""
         n = len(self.mechanism.bodies)
         if not columns:
             return [()] * n
         values = []
         for column in columns:
             if isinstance(column, np.ndarray):
-                end = column.shape[-1]
-                values.append([np.asarray(column[..., k]) for k in range(end - n, end)])
+                values.append(self.mechanism.joint_entries(column))
             else:
                 values.append(column[len(column) - n :])
         return list(zip(*values, strict=True))

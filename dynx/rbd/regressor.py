@@ -124,6 +124,8 @@ def body_states(
     loops: Loops, poses: Sequence[BodyPose], v: Array, a: Array
 ) -> tuple[Sequence[BodyKinematics], Sequence[Array]]:
     """Return the state of every body, the root's first, and the axes (..., 3) of the joints in the world."""
+    if loops.mechanism.balls:
+        a = a - loops.mechanism.rate_products(v)
     return loops.outward(_move, loops.root(_root_state, poses[0], v, a), poses, v, a)
 
 

@@ -84,6 +84,8 @@ def inverse_dynamics(
     first six entries are the force and the moment at the origin of the base frame, in its axes.
     """
     loops = loops or PythonLoops(mechanism)
+    if mechanism.balls:
+        a = a - mechanism.rate_products(v)
     root = loops.root(root_motion, q, v, a)
     root_wrench = loops.root(_root_wrench, root)
     _, moved = loops.outward(_move, root, q, v, a)

@@ -28,6 +28,7 @@ class ReferenceBackend(Backend):
 
     name: ClassVar[str] = "reference"
     vectorized: ClassVar[bool] = True
+    takes_ball_joints: ClassVar[bool] = True
 
     @property
     def engine_version(self) -> str:

@@ -11,6 +11,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.reading import printable
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.loading import load, read_description, read_model
 from dynx.model.mechanism import ROOT
 from dynx.model.numbers import is_real
@@ -167,9 +168,11 @@ def same_robot(
 def _read(x: Robot, base: Base | None, folders: list[StrPath]) -> _Loaded:
     if isinstance(x, Model):
         model = load(x, base=base)
+        refuse_ball_joints(model, "same_robot")
         return _Loaded(model, model.name)
     data, source, name = read_description(x, folders)
     model = read_model(data, source, name, base=base, package_dirs=folders)
+    refuse_ball_joints(model, "same_robot")
     if name is None:
         return _Loaded(model, model.name, data)
     return _Loaded(model, printable(x if isinstance(x, str) else source), data)

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_array, checked_entries, real_array
 from dynx.spatial.scalar import Floats
@@ -126,6 +127,7 @@ def configuration(name: str, q: ArrayLike, model: Model | None) -> Floats:
         array = checked_entries(name, real_array(name, q))
         wanted = "(nq,)"
     else:
+        refuse_ball_joints(model, "a trajectory")
         array = checked_q(model, q, name)
         wanted = f"({model.nq},)"
     if array.ndim != 1 or not array.size:

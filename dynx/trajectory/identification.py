@@ -29,6 +29,7 @@ from dynx.argument_types import checks_types
 from dynx.backends import backend as make_backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.numbers import checked_generator, read_only, whole_number
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
@@ -50,6 +51,7 @@ class Identifiability:
 
     def __init__(self, model: Model, *, backend: str = DEFAULT_ENGINE, samples: int = SAMPLES) -> None:
         self._samples = whole_number("samples", samples, 1)
+        refuse_ball_joints(model, "a trajectory")
         self._engine = make_backend(backend, model)
         rng = np.random.default_rng(0)
         v, a = rng.standard_normal((2, SAMPLES, model.nv))
@@ -240,6 +242,7 @@ def _random_series(rng: np.random.Generator, T: float, harmonics: int, nv: int) 
 
 
 def _ends_around(model: Model, q0: ArrayLike | None) -> Ends:
+    refuse_ball_joints(model, "a trajectory")
     if model.floating or not model.nv:
         why = "a floating base" if model.floating else "no joint that moves"
         raise ArgumentError(f"{model.name} has {why}; excitation needs joints on a fixed base")

@@ -13,6 +13,7 @@ from dynx.backends import Backend
 from dynx.backends import backend as make_backend
 from dynx.errors import ArgumentError, LimitError, LimitViolation, ShapeError, shown
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
@@ -83,6 +84,7 @@ def violations(
     """
     if not isinstance(trajectory, Trajectory):
         raise ArgumentError(f"trajectory is of type {type(trajectory).__name__}; wanted a Trajectory")
+    refuse_ball_joints(model, "a check of limits")
     if (trajectory.nq, trajectory.nv) != (model.nq, model.nv):
         raise ShapeError(
             f"the trajectory has nq {trajectory.nq}, nv {trajectory.nv}; "

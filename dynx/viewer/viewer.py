@@ -18,6 +18,7 @@ from dynx.errors import ArgumentError, nearest, shown
 from dynx.files.films import WRITERS
 from dynx.files.reading import checked_path
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.loading import load
 from dynx.model.numbers import checked_vector, is_real, whole_number
 from dynx.spatial.scalar import Floats
@@ -105,10 +106,11 @@ def open_subject(shown_object: object) -> object:
     A Scene is opened as a World in the first engine installed, and what `dynx.load` takes is loaded. Raises
     the errors of loading, and ArgumentError for anything else.
     """
-    if isinstance(shown_object, Model):
-        return shown_object
     if isinstance(shown_object, str | os.PathLike | bytes):
-        return load(shown_object)
+        shown_object = load(shown_object)
+    if isinstance(shown_object, Model):
+        refuse_ball_joints(shown_object, "the viewer")
+        return shown_object
     from dynx.sim import BatchRollouts, Rollout
     from dynx.world import Scene, World
     from dynx.world.comparison import WorldComparison

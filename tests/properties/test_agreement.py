@@ -18,6 +18,7 @@ from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.sampling import Samples, draw_samples
 from dynx.backends import Backend, backend, installed_backends
 from dynx.backends.derived import DerivedBackend, native_quantities
+from dynx.backends.registry import backend_class
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.testing.strategies import models, samples, wrenches
@@ -59,6 +60,9 @@ def backends_of(model: Model, names: Sequence[str] | None = None) -> Iterator[li
 INTERPRETED = [name for name in installed_backends() if name != "compiled"]
 """Backends that load a new robot at once. The compiled one makes some thirty kernels for each robot, which
 takes half a second, so it is tested on fewer robots (`test_compiled_random_robots`)."""
+
+
+TAKING_BALL_JOINTS = [name for name in INTERPRETED if backend_class(name).takes_ball_joints]
 
 
 def assert_agree(engines: list[Backend], states: Samples) -> None:
@@ -104,6 +108,17 @@ def test_random_robots(kind: str, base: Base, data: st.DataObject) -> None:
         if kind == "solvable":
             for engine in engines:
                 assert np.isfinite(engine.forward_dynamics(states.q, states.v, states.tau)).all()
+        assert_agree(engines, states)
+
+
+@each_base
+@given(data=st.data())
+@settings(max_examples=min(PROFILE, max(15, PROFILE // 4)))
+def test_random_robots_with_ball_joints(base: Base, data: st.DataObject) -> None:
+    kinds = ("ball", "revolute", "prismatic", "continuous", "fixed")
+    model = data.draw(models(base=base, joint_types=kinds, locks=False))
+    states = draw_samples(model, 3, seed=data.draw(st.integers(0, 9)))
+    with backends_of(model, TAKING_BALL_JOINTS) as engines:
         assert_agree(engines, states)
 
 

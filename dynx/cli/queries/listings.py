@@ -119,7 +119,7 @@ def _tree(model: Model) -> Tree:
 def _joint_table(model: Model) -> Table:
     right = ("q", "lower", "upper", "velocity", "effort")
     table = Table("q", "joint", "type", "axis", *right[1:], "follows", right=right, keys=2)
-    index = {name: k + (7 if model.floating else 0) for k, name in enumerate(model.joint_names)}
+    index = {name: model.position_index(name) for name in model.joint_names}
     for joint in model.joints:
         if not joint.moves:
             continue
@@ -129,7 +129,7 @@ def _joint_table(model: Model) -> Table:
             str(index.get(joint.name, "")),
             one_line(joint.name),
             joint.type,
-            _vector(joint.axis),
+            "" if joint.type == "ball" else _vector(joint.axis),
             *(f"{bound:.4g}" if math.isfinite(bound) else "-" for bound in bounds),
             _mimic_rule(joint),
         )

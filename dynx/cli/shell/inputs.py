@@ -83,7 +83,7 @@ def configuration(model: Model, given: Numbers, option: str = "--q", default: Fl
     """Return q (nq,): `given`, where joints without a value keep `default` (None: the neutral one)."""
     base = ["x", "y", "z", "qx", "qy", "qz", "qw"] if model.floating else []
     start = model.neutral() if default is None else default.copy()
-    q = checked_q(model, _filled(model, given, start, base, option), option)
+    q = checked_q(model, _filled(model, given, start, base, model.position_names, option), option)
     if given is not None:
         for note in position_notes(model, q, option):
             remark(note)
@@ -92,13 +92,14 @@ def configuration(model: Model, given: Numbers, option: str = "--q", default: Fl
 
 def velocity(model: Model, given: Numbers, option: str) -> Floats:
     """Return v, a or tau (nv,): `given`, where joints without a value are zero."""
-    filled = _filled(model, given, np.zeros(model.nv), _base_velocity(model), option)
+    names = model.coordinate_names
+    filled = _filled(model, given, np.zeros(model.nv), _base_velocity(model), names, option)
     return checked_array(option, filled, model.nv)
 
 
 def velocity_names(model: Model) -> list[str]:
     """Name the coordinate of each entry of v, a and tau."""
-    return [*_base_velocity(model), *model.joint_names]
+    return [*_base_velocity(model), *model.coordinate_names]
 
 
 def target_pose(given: Numbers, option: str) -> Floats:
@@ -185,16 +186,18 @@ def _base_velocity(model: Model) -> list[str]:
     return ["base vx", "base vy", "base vz", "base wx", "base wy", "base wz"] if model.floating else []
 
 
-def _filled(model: Model, given: Numbers, default: Floats, base: Sequence[str], option: str) -> Floats:
-    """Fill an array like `default`, whose first entries are those of the `base`, from the option."""
+def _filled(
+    model: Model, given: Numbers, default: Floats, base: Sequence[str], own: Sequence[str], option: str
+) -> Floats:
+    """Fill an array like `default`, whose entries are those of the `base` and its `own`, from the option."""
     if given is None:
         return default
     if isinstance(given, Mapping):
         for name, value in given.items():
-            default[len(base) + _joint_number(model, name, option)] = value
+            default[len(base) + _joint_number(model, own, name, option)] = value
         return default
     if len(given) != len(default):
-        names = [*base, *map(one_line, model.joint_names)]
+        names = [*base, *map(one_line, own)]
         listed = ", ".join(names[:_LISTED_NAMES]) + (", ..." if len(names) > _LISTED_NAMES else "")
         numbers = "1 number" if len(given) == 1 else f"{len(given)} numbers"
         needed = f"{len(names)}: {listed}" if names else "none"
@@ -202,14 +205,15 @@ def _filled(model: Model, given: Numbers, default: Floats, base: Sequence[str], 
     return np.array(given, dtype=np.float64)
 
 
-def _joint_number(model: Model, name: str, option: str) -> int:
-    """Return the position in `joint_names`, or raise an error with the reason why there is none."""
-    if name in model.joint_names:
-        return model.joint_names.index(name)
+def _joint_number(model: Model, names: Sequence[str], name: str, option: str) -> int:
+    """Return the position in `names`, or raise an error with the reason why there is none."""
+    if name in names:
+        return names.index(name)
     if all(joint.name != name for joint in model.joints):
-        raise UnknownNameError(
-            f"{option}: {model.name} has no joint {shown(name)}{nearest(name, model.joint_names)}"
-        )
+        raise UnknownNameError(f"{option}: {model.name} has no joint {shown(name)}{nearest(name, names)}")
+    if model.joint(name).type == "ball":
+        parts = [each for each in names if each.rpartition(".")[0] == name]
+        raise UnknownNameError(f"{option}: {shown(name)} is a ball joint; its parts are {', '.join(parts)}")
     try:
         return model.coordinate_index(name)
     except UnknownNameError as error:

@@ -3,8 +3,8 @@
 The engine's model is built from the links and joints of the `Model` (`build`), independently of
 `dynx.model.mechanism`; it has no limits, contacts, damping or actuators, so MuJoCo's constraint solver is
 idle. Mass matrix and torques are computed from MuJoCo's poses, axes, accelerations and inertias, because
-`mj_crb` and `mj_rne` lose digits (`ProjectedDynamics`). Tree coordinates are MuJoCo's own except for a
-floating base: its quaternion is (w, x, y, z), and its linear velocity is in world axes.
+`mj_crb` and `mj_rne` lose digits (`ProjectedDynamics`). Tree coordinates are MuJoCo's own with two
+exceptions: quaternions are (w, x, y, z), and the linear velocity of a floating base is in world axes.
 
 Several threads may use it: each has its own workspace of the engine (`MjData`), made on its first call.
 MuJoCo releases the GIL in its calls.
@@ -55,6 +55,12 @@ class ProjectedDynamics:
 
     def __init__(self, engine: Any, *, floating: bool) -> None:
         self._floating = floating
+        # For each coordinate, MuJoCo's joint; of the three of a ball joint, the axis of its body.
+        self._joints: NDArray[np.intp] = np.asarray(engine.dof_jntid, dtype=np.intp)
+        kinds = engine.jnt_type[self._joints]
+        balls = np.flatnonzero(kinds == mujoco.mjtJoint.mjJNT_BALL)
+        axis = balls - engine.jnt_dofadr[self._joints[balls]]
+        self._balls = (balls, engine.jnt_bodyid[self._joints[balls]], axis) if balls.size else None
         self._bodies = np.flatnonzero(_has_inertia(engine) & (engine.body_weldid != 0))
         self._inertia = _moments_and_masses(engine, self._bodies)
         mass, moments = engine.body_mass[self._bodies], engine.body_inertia[self._bodies]
@@ -62,7 +68,7 @@ class ProjectedDynamics:
         self._revolute: Floats = np.array(
             [0.0] * 3 * floating
             + [1.0] * 3 * floating
-            + [float(kind == mujoco.mjtJoint.mjJNT_HINGE) for kind in engine.jnt_type[int(floating) :]]
+            + [float(kind != mujoco.mjtJoint.mjJNT_SLIDE) for kind in kinds[6 * floating :]]
         )[:, None]
         self._translations = np.flatnonzero(self._revolute == 0.0)
         # For each coordinate, the bodies that it moves.
@@ -131,7 +137,14 @@ class ProjectedDynamics:
         """Return the axis (nv, 3) of every coordinate in world axes, and the levers (nv, n, 3) from there to
         the centres of mass of all bodies."""
         axes, anchors = data.xaxis, data.xanchor
-        if self._floating:
+        if self._balls is not None:
+            axes, anchors = axes[self._joints], anchors[self._joints]
+            dofs, bodies, columns = self._balls
+            axes[dofs] = data.xmat.reshape(-1, 3, 3)[bodies, :, columns]
+            if self._floating:
+                axes[:3] = axes[3:6] = R_root.T
+                anchors[:6] = p_root
+        elif self._floating:
             axes = np.concatenate((R_root.T, R_root.T, axes[1:]))
             anchors = np.concatenate((p_root[None].repeat(6, 0), anchors[1:]))
         return axes, data.xipos.take(self._bodies, 0, None, "clip") - anchors[:, None]
@@ -234,6 +247,7 @@ class MujocoBackend(Backend):
     """
 
     name: ClassVar[str] = "mujoco"
+    takes_ball_joints: ClassVar[bool] = True
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
         """Raises EngineLimitError for a model that is too large for the engine."""
@@ -249,6 +263,13 @@ class MujocoBackend(Backend):
             raise EngineError(f"mujoco cannot represent {model.name}: {_message(error)}") from error
         self._nv = self._mechanism.nv
         self._floating = model.floating
+        # Entries of q in MuJoCo's order of quaternions.
+        self._order: NDArray[np.intp] | None = None
+        if model.ball_joints:
+            order = np.arange(model.nq)
+            for first in model.quaternions:
+                order[first : first + 4] = first + 3, first, first + 1, first + 2
+            self._order = order
         self._dynamics = ProjectedDynamics(self._engine, floating=model.floating)
         self._masses_add = tree.masses_add
         self._total_mass = float(self._engine.body_subtreemass[ROOT_BODY])
@@ -353,7 +374,8 @@ class MujocoBackend(Backend):
             work.v[:], work.tau[:] = v, tau
             work.v[:3], work.tau[:3] = work.R[ROOT_BODY] @ v[:3], work.R[ROOT_BODY] @ tau[:3]
         else:
-            work.q[:], work.v[:], work.tau[:] = q, v, tau
+            work.q[:] = q if self._order is None else q[self._order]
+            work.v[:], work.tau[:] = v, tau
         before = work.almost_singular.number
         mujoco.mj_forward(self._engine, work.data)
         if work.almost_singular.number != before:
@@ -436,9 +458,12 @@ class MujocoBackend(Backend):
     def _set_positions(self, q: Floats) -> _Workspace:
         """Compute the poses of all bodies at `q` in this thread's workspace, which is returned."""
         work = self._workspace
-        work.q[:] = q
-        if self._floating:
-            work.q[3], work.q[4:7] = q[6], q[3:6]
+        if self._order is not None:
+            work.q[:] = q[self._order]
+        else:
+            work.q[:] = q
+            if self._floating:
+                work.q[3], work.q[4:7] = q[6], q[3:6]
         mujoco.mj_kinematics(self._engine, work.data)
         return work
 

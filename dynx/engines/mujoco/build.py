@@ -43,6 +43,9 @@ WORLD_BODY = 0
 ROOT_BODY = 1
 """MuJoCo's number for the root link."""
 
+_JOINT_TYPES = {"prismatic": mujoco.mjtJoint.mjJNT_SLIDE, "ball": mujoco.mjtJoint.mjJNT_BALL}
+"""Joints other than hinges."""
+
 
 @dataclass(frozen=True)
 class MujocoTree:
@@ -62,7 +65,7 @@ def refuse_large(model: Model) -> None:
 
     They are counted in the description: merging the links of a large robot takes a second.
     """
-    nv = sum(joint.moves for joint in model.joints) + (6 if model.floating else 0)
+    nv = sum(joint.n_rates for joint in model.joints) + (6 if model.floating else 0)
     if nv > MAX_NV:
         raise EngineLimitError(
             f"{model.name} has {nv} degrees of freedom; the backend 'mujoco' takes at most {MAX_NV}"
@@ -87,8 +90,7 @@ def build_tree(model: Model) -> MujocoTree:
         depths[joint.child] = depths[joint.parent] + 1
         bodies[joint.child] = body = _body(bodies[joint.parent], numbers[joint.child], joint.origin)
         if joint.moves:
-            slides = joint.type == "prismatic"
-            kind = mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
+            kind = _JOINT_TYPES.get(joint.type, mujoco.mjtJoint.mjJNT_HINGE)
             body.add_joint(type=kind, axis=np.array(joint.axis))
     for frame in model.extra_frames:
         _body(bodies[frame.link], numbers[frame.name], frame.placement)

@@ -1,8 +1,8 @@
 """The backend `pinocchio`: every quantity by Pinocchio's own algorithms (Carpentier et al., 2019).
 
 The engine's model is built from the links and joints of the `Model`, so Pinocchio merges fixed joints and
-inertias, independently of `dynx.model.mechanism`. Coordinates need no conversion: Pinocchio's free-flyer has
-the conventions of dynx, and tree coordinates are added in the same depth-first order.
+inertias, independently of `dynx.model.mechanism`. Coordinates need no conversion: Pinocchio's free-flyer and
+spherical joint have the conventions of dynx, and tree coordinates are added in the same depth-first order.
 
 Several threads may use it: each has its own workspace of the engine (`Data`), made on its first call. A
 `Data` takes 64 nv^3 bytes (measured, Pinocchio 4.1: 0.5 GB at 200 degrees of freedom), hence `MAX_NV`.
@@ -80,6 +80,7 @@ class PinocchioBackend(Backend):
     """
 
     name: ClassVar[str] = "pinocchio"
+    takes_ball_joints: ClassVar[bool] = True
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
         """Raises EngineLimitError for a model that the engine cannot represent or that is too large."""

@@ -53,7 +53,7 @@ def refuse_large(model: Model) -> None:
 
     They are counted in the description: merging the links of a large robot takes a second.
     """
-    nv = sum(joint.moves for joint in model.joints) + (6 if model.floating else 0)
+    nv = sum(joint.n_rates for joint in model.joints) + (6 if model.floating else 0)
     if nv > MAX_NV:
         raise EngineLimitError(
             f"{model.name} has {nv} degrees of freedom; the backend 'pinocchio' "
@@ -226,6 +226,8 @@ def _placement(pose: Pose) -> Any:
 
 def _joint_model(joint: Joint) -> Any:
     """Return the engine's joint; for axes along a basis vector the engine has faster code."""
+    if joint.type == "ball":
+        return pin.JointModelSpherical()
     prismatic = joint.type == "prismatic"
     if joint.axis == (1.0, 0.0, 0.0):
         return pin.JointModelPX() if prismatic else pin.JointModelRX()

@@ -15,6 +15,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, NoClosedFormError, UnknownNameError, nearest, shown
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.mechanism import joint_motion
 from dynx.model.numbers import MAX_MAGNITUDE, is_real
 from dynx.rbd.kinematics import ancestry
@@ -57,6 +58,7 @@ def chain_to(model: Model, frame: str, given: Mapping[str, float]) -> Chain:
     Raises NoClosedFormError for a floating base, and for a joint of the chain that is coupled to another;
     UnknownNameError or ArgumentError for `given`.
     """
+    refuse_ball_joints(model, "inverse kinematics")
     given = checked_given(model, given)
     if model.floating:
         raise NoClosedFormError(f"{model.name} has a floating base; the closed form needs a fixed one")

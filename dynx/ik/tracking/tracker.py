@@ -28,6 +28,7 @@ from dynx.ik.reach import proof_of
 from dynx.ik.tracking.followers import AvoidingFollower, Follower, SampleFollower, path_follower
 from dynx.ik.tracking.path import AT_BOUND, PathTracker, TrackedPath, TrackLimits, TrackResult, TrackStatus
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import matrix_of_pair
 from dynx.model.numbers import checked_vector, is_real, positive_seconds, whole_number
 from dynx.model.targets import Targets, checked_targets
@@ -210,6 +211,7 @@ def track(
     invalid argument.
     """
     model = backend.model
+    refuse_ball_joints(model, "inverse kinematics")
     model.frame_index(frame)
     seconds = None if dt is None else positive_seconds("dt", dt)
     for name, number in (

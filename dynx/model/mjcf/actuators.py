@@ -74,7 +74,7 @@ def _actuator(document: MjcfText, element: Element, joints: Mapping[str, Joint])
         if name not in _OF_ALL and name not in _OF_ONE[tag]:
             raise NotTakenError(f"has {escaped(name)}")
     on = given.get("joint", given.get("jointinparent", ""))
-    if on not in joints or not joints[on].moves:
+    if on not in joints or not joints[on].moves or joints[on].type == "ball":
         raise NotTakenError("acts on no joint of the robot with one coordinate")
     gain, bias = _terms(document, element, what)
     gear = reading.some_numbers(element, "gear", what, 1, 6)[0] if "gear" in given else 1.0

@@ -66,7 +66,9 @@ def joint_attributes(joint: Joint, limits: tuple[float, float], dynamics: JointD
 
     `limits` are its lower and upper one [rad or m], which may be infinite.
     """
-    values: dict[str, Any] = {"type": "slide" if joint.type == "prismatic" else "hinge", "axis": joint.axis}
+    values: dict[str, Any] = {"type": {"prismatic": "slide", "ball": "ball"}.get(joint.type, "hinge")}
+    if joint.type != "ball":
+        values["axis"] = joint.axis
     lower, upper = limits
     if np.isfinite(lower) or np.isfinite(upper):
         lower, upper = max(lower, -UNLIMITED), min(upper, UNLIMITED)

@@ -2,8 +2,8 @@
 
 Each body is a link whose frame is the body's, and each site with a name is a frame. A joint of a body that
 has several, or that lies off the body's origin, moves a link without mass. Positions are those of MuJoCo: `q`
-equals `qpos` but for the quaternion of a free joint, which MuJoCo writes w, x, y, z. MuJoCo expresses the
-linear part of the base's velocity in the world, dynx in the base. No part of MuJoCo is needed.
+equals `qpos` but for the quaternions of free and ball joints, which MuJoCo writes w, x, y, z. MuJoCo
+expresses the linear part of the base's velocity in the world, dynx in the base. No part of MuJoCo is needed.
 
 `read_mjcf` returns the one robot of a file, `read_trees` each tree of bodies by itself, of which a scene is
 made.
@@ -98,7 +98,7 @@ _OF_ONE_ROBOT = ("actuator", "contact")
 _IN_ROOT = frozenset(
     ["compiler", "option", "size", "statistic", "visual", "default", "asset", "worldbody", "custom"]
 )
-_JOINT_TYPES: dict[str, JointType] = {"hinge": "revolute", "slide": "prismatic"}
+_JOINT_TYPES: dict[str, JointType] = {"hinge": "revolute", "slide": "prismatic", "ball": "ball"}
 
 
 def read_mjcf(data: str | bytes, source: str, package_dirs: Iterable[StrPath] = ()) -> Description | None:
@@ -546,17 +546,18 @@ class _TreeReader:
             kind = self._joint_type(element)
             if kind == "free":
                 raise self._reading.error(element, f"{what} is free; its body is not directly in the world")
-            if kind == "ball":
-                raise self._reading.unsupported(
-                    element, f"{what} is a ball joint, which a Model cannot say; use three hinges"
+            before = [self._joint_type(each) for each, _ in body.joints[:number]]
+            if kind != "slide" and "ball" in before:
+                raise self._reading.error(
+                    element, f"{what} turns the body {shown(body.name)}, which a ball joint turns already"
                 )
-            point, axis = self._point_and_axis(element, outer, what)
+            point, axis = self._point_and_axis(element, outer, kind, what)
             reference = self._position(element, "ref", kind, what)
             self._parts.positions.append((name, reference))
             origin = at @ homogeneous(_NO_ROTATION, point)
             if kind == "hinge":
                 origin = origin @ homogeneous(turn(axis, -reference), np.zeros(3))
-            else:
+            elif kind == "slide":
                 origin = origin @ homogeneous(_NO_ROTATION, -reference * axis)
             final = number == len(body.joints) - 1 and not point.any()
             child = body.name
@@ -611,12 +612,14 @@ class _TreeReader:
             return "free"
         return self._reading.choice(element, "type", "a joint", ("hinge", "slide", "ball", "free"), "hinge")
 
-    def _point_and_axis(self, element: Element, outer: Floats, what: str) -> tuple[Floats, Floats]:
+    def _point_and_axis(self, element: Element, outer: Floats, kind: str, what: str) -> tuple[Floats, Floats]:
         reading, given = self._reading, element.attributes
         point = np.array(reading.vector(element, "pos", what) if "pos" in given else (0.0, 0.0, 0.0))
         axis = np.array(reading.vector(element, "axis", what) if "axis" in given else (0.0, 0.0, 1.0))
         length = float(np.linalg.norm(axis))
-        if length < 1e-14:
+        if kind == "ball":
+            axis, length = np.array((0.0, 0.0, 1.0)), 1.0
+        elif length < 1e-14:
             raise reading.error(element, f"the axis of {what} is zero; wanted a direction")
         if (outer != np.eye(4)).any():
             point, axis = outer[:3, :3] @ point + outer[:3, 3], outer[:3, :3] @ axis
@@ -631,7 +634,13 @@ class _TreeReader:
         limited = self._document.is_limited(element, "limited", "range", what)
         if limited:
             ends = reading.numbers(element, "range", what, 2)
-            lower, upper = map(self._document.compiler_of(element).radians, ends) if kind == "hinge" else ends
+            lower, upper = map(self._document.compiler_of(element).radians, ends) if kind != "slide" else ends
+            if kind == "ball" and lower:
+                raise reading.error(
+                    element,
+                    f"range of {what} is {shown(element.attributes['range'])}; wanted 0 and the largest "
+                    "angle of a ball joint",
+                )
             if lower >= upper:
                 raise reading.error(
                     element,
@@ -642,7 +651,12 @@ class _TreeReader:
             lower = lower if lower > -UNLIMITED else -INFINITY
             upper = upper if upper < UNLIMITED else INFINITY
             limits, limited = Limits(lower, upper), not lower == -upper == -INFINITY
-        if self._document.is_limited(element, "actuatorfrclimited", "actuatorfrcrange", what):
+        if kind == "ball":
+            if "actuatorfrcrange" in element.attributes:
+                reading.note(
+                    element, f"actuatorfrcrange of {what} is not read: MuJoCo has none for a ball joint"
+                )
+        elif self._document.is_limited(element, "actuatorfrclimited", "actuatorfrcrange", what):
             low, high = reading.numbers(element, "actuatorfrcrange", what, 2)
             if low == -high and high > 0.0:
                 limits = replace(limits, effort=high)
@@ -746,6 +760,9 @@ class _TreeReader:
             coefficients = dict.fromkeys(coefficients, 0.0)
         options = self._document.options
         stiffness = coefficients["stiffness"] if options.disabled("spring") is None else 0.0
+        if stiffness and kind == "ball":
+            reading.note(element, f"stiffness of {what} is not read: a ball joint has no spring in dynx")
+            stiffness = 0.0
         if stiffness and reading.number_or(element, "springyield", what, 0.0):
             reading.note(element, f"springyield of {what} is not read: its spring is elastic")
         friction = reading.number_or(element, "frictionloss", what, 0.0)

@@ -238,6 +238,7 @@ class RobotWriter:
             row[link.name] = row[joint.parent] + 1 if joint.parent in found else 1
             if (
                 joint.moves
+                and joint.type != "ball"
                 and link.inertial in (None, Inertial())
                 and [each.moves and each.origin.rpy == ZERO for each in next_ones] == [True]
                 and shapes == LinkGeometry()
@@ -270,13 +271,20 @@ class RobotWriter:
         limits = joint.limits
         _refuse_nan(joint)
         ends = (-math.inf, math.inf)
-        if joint.type != "continuous":
+        if joint.type == "ball":
+            # Without an upper end a range of MuJoCo has no lower one.
+            ends = (0.0, limits.upper) if limits.upper < math.inf else ends
+        elif joint.type != "continuous":
             ends = min(limits.lower, limits.upper), max(limits.lower, limits.upper)
         given = joint_attributes(joint, ends, joint.dynamics)
         for kind, end in zip(("lower", "upper"), ends, strict=True):
             if UNLIMITED <= abs(end) < math.inf or (kind == "upper" and end == ends[0]):
                 self._extension.numbers[kind][joint.name] = end
-        if 0.0 < limits.effort < UNLIMITED:
+        if joint.type == "ball":
+            if limits.effort != Limits().effort:
+                self._extension.numbers["effort"][joint.name] = limits.effort
+                _add(self._kinds, "MuJoCo limits no effort of ball joints; dynx reads it", joint.name)
+        elif 0.0 < limits.effort < UNLIMITED:
             given["actuatorfrcrange"] = text((-limits.effort, limits.effort))
         elif limits.effort != Limits().effort:
             self._extension.numbers["effort"][joint.name] = limits.effort
@@ -292,7 +300,9 @@ class RobotWriter:
 
     def _add_motor(self, joint: Joint) -> None:
         effort = joint.limits.effort
-        if effort > 0.0:
+        if joint.type == "ball":
+            _add(self._kinds, "A motor of MuJoCo acts about one axis, so ball joints have none", joint.name)
+        elif effort > 0.0:
             given = {"ctrlrange": text((-effort, effort))} if effort < UNLIMITED else {}
             SubElement(self._actuator, "motor", {"name": joint.name, "joint": joint.name} | given)
 
@@ -371,8 +381,10 @@ class RobotWriter:
         kept = "dynx alone reads it in <custom>"
         if extension.numbers["velocity"]:
             self._note_names("MuJoCo has no limit of speed", extension.numbers["velocity"], kept)
-        if extension.numbers["effort"]:
-            self._note_names("MuJoCo has no effort limit of 0 or below", extension.numbers["effort"], kept)
+        balls = {joint.name for joint in tree.ball_joints}
+        without_effort = [name for name in extension.numbers["effort"] if name not in balls]
+        if without_effort:
+            self._note_names("MuJoCo has no effort limit of 0 or below", without_effort, kept)
         if extension.numbers["locked"]:
             self._note_names(
                 "Locked joints are fixed, without their axes and limits",

@@ -54,11 +54,11 @@ _TYPES: dict[str, tuple[JointType, ...]] = {
     "continuous": ("continuous",),
     "prismatic": ("prismatic",),
     "fixed": (),
+    "ball": ("ball",),
     "universal": ("revolute", "revolute"),
     "revolute2": ("revolute", "revolute"),
 }
 _REFUSED = {
-    "ball": "which a Model cannot say; use three revolute joints",
     "screw": "whose turn and slide are coupled, which a Model cannot say",
     "gearbox": "which couples two joints; a <mimic> says that of two axes",
 }
@@ -81,7 +81,8 @@ def read_sdf(data: str | bytes, source: str, package_dirs: Iterable[StrPath] = (
 
 @dataclass
 class _Axis:
-    """One axis of a joint: its name in the model, and its direction (3,) in the frame of the joint."""
+    """One axis of a joint: its name in the model, and its direction (3,) in the frame of the joint; a ball
+    joint is one without a direction."""
 
     name: str
     type: JointType
@@ -367,7 +368,7 @@ class _RobotReader:
             direction = R @ each.direction if (R != _NO_ROTATION).any() else each.direction
             turns = each.type != "prismatic"
             final = number == len(axes) - 1
-            off = turns and bool(np.cross(point, direction).any())
+            off = turns and bool((point if each.type == "ball" else np.cross(point, direction)).any())
             # All axes of one joint meet in its origin.
             chained = not final or off or (len(axes) > 1 and bool(point.any()))
             below = (
@@ -393,12 +394,13 @@ class _RobotReader:
         self, axis: _Axis, parent: str, child: str, origin: Pose, direction: Floats, joint: NamedPart
     ) -> None:
         what = f"joint {shown(axis.name)}"
-        limits = self._limits(axis.element, what)
+        limits = self._limits(axis.element, what, ball=axis.type == "ball")
         endless = limits.lower == -INFINITY and limits.upper == INFINITY
         kind = axis.type
         if kind == "continuous" or (kind == "revolute" and endless):
             kind, limits = "continuous", replace(limits, lower=-INFINITY, upper=INFINITY)
-        x, y, z = (direction / np.linalg.norm(direction) + 0.0).tolist()
+        length = 1.0 if kind == "ball" else np.linalg.norm(direction)
+        x, y, z = (direction / length + 0.0).tolist()
         self._joints.append(
             Joint(
                 axis.name,
@@ -440,6 +442,10 @@ class _RobotReader:
         reading, axes = self._reading, []
         for (name, tag), kind in zip(self._axis_names(joint), _TYPES[_kind(joint)], strict=True):
             element = reading.only(joint.element, tag)
+            if kind == "ball":
+                # The format has no axis for it; damping and limits stand in one that a file may have.
+                axes.append(_Axis(name, kind, np.zeros(3), element or joint.element))
+                continue
             if element is None:
                 raise reading.error(joint.element, f"{joint.what} is {_kind(joint)} and has no <{tag}>")
             direction = self._frames.axis(joint, element, joint.what)
@@ -451,7 +457,8 @@ class _RobotReader:
                 )
         return axes
 
-    def _limits(self, axis: Element, what: str) -> Limits:
+    def _limits(self, axis: Element, what: str, *, ball: bool = False) -> Limits:
+        """Read limits; of a ball joint those in elements of dynx alone, because others have no meaning."""
         reading = self._reading
         limit = reading.only(axis, "limit")
         if limit is None:
@@ -459,6 +466,11 @@ class _RobotReader:
         own = {
             name: reading.scalar(limit, tag, what, INFINITY) for name, tag in LIMITS.items() if limit.all(tag)
         }
+        if ball:
+            for tag in ("lower", "upper", "velocity", "effort"):
+                if limit.all(tag):
+                    reading.note(limit, f"<{tag}> of {what} is not used: it has no meaning for a ball joint")
+            return Limits(0.0, own.pop("upper", INFINITY), **own)
         lower = own.get("lower", self._limit(limit, "lower", what, -INFINITY))
         upper = own.get("upper", self._limit(limit, "upper", what, INFINITY))
         if lower > upper:

@@ -200,6 +200,8 @@ class SdfWriter:
             return
         axis = SubElement(element, "axis")
         _text(axis, "xyz", joint.axis)
+        if joint.type == "ball":
+            _add(self._kinds, _BALL, joint.name)
         if joint.mimic is not None:
             mimic = SubElement(axis, "mimic", joint=self._joints[joint.mimic.joint])
             _text(mimic, "multiplier", joint.mimic.multiplier)
@@ -223,7 +225,9 @@ class SdfWriter:
         if any(map(math.isnan, (limits.lower, limits.upper, limits.velocity, limits.effort))):
             raise DescriptionError(f"a limit of joint {shown(joint.name)} is NaN, which SDF cannot express")
         found = {"velocity": limits.velocity, "effort": limits.effort}
-        if joint.type != "continuous":
+        if joint.type == "ball":
+            found["upper"] = limits.upper
+        elif joint.type != "continuous":
             found["lower"] = min(limits.lower, limits.upper)
             found["upper"] = max(limits.lower, limits.upper)
         absent = Limits()
@@ -236,6 +240,8 @@ class SdfWriter:
                 continue
             value = stated[name]
             unread = abs(value) >= UNLIMITED or (name in ("velocity", "effort") and value < 0.0)
+            # The format gives no meaning to limits of a ball joint.
+            unread = unread or joint.type == "ball"
             _text(around, LIMITS[name] if unread and math.isfinite(value) else name, value)
             if unread and math.isfinite(value):
                 _add(self._kinds, _LIMIT, joint.name)
@@ -347,6 +353,7 @@ class SdfWriter:
 
 _RENAMED = "Parts have other names, as SDF reserves some and names no two parts alike; dynx reads their own"
 _LOCKED = "Locked joints are fixed, without their axes and limits; dynx reads their positions"
+_BALL = "The axis of a ball joint has no meaning but for its damping"
 _ARMATURE = "Armature is in <drake:rotor_inertia>, which Drake and dynx read"
 _LIMIT = "A limit is in an element of dynx, because SDF takes such a number for no limit"
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, shown
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, JointDynamics, Pose, Vector
 from dynx.model.geometry import (
     Appearance,
@@ -147,6 +148,7 @@ def urdf_text(
     image_path: ImagePath = _as_it_is,
 ) -> str:
     """Return the robot as `write_urdf` does, with other paths of meshes and images."""
+    refuse_ball_joints(tree, "URDF")
     lines = ['<?xml version="1.0"?>', f"<robot name={_name(tree.name)}>", *_settings(tree)]
     for link in tree.links:
         content = [] if link.inertial is None else [*_inertial(link.inertial)]

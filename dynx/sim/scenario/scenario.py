@@ -17,6 +17,7 @@ from dynx.control.base import Controller, refuse_other_than_controller
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import check_document, parse_json
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
 from dynx.model.package_search import StrPath
@@ -112,6 +113,7 @@ class Scenario(SimulationOptions):
 
     def __post_init__(self) -> None:
         refuse_other_than_model(self.model)
+        refuse_ball_joints(self.model, "a simulation")
         if not isinstance(self.controller, Unknown | None):
             refuse_other_than_controller("controller", self.controller)
         if isinstance(self.reference, str) or (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from hypothesis import strategies as st
@@ -40,11 +40,13 @@ def configurations(model: Model, *, within_limits: bool = False) -> Strategy[Flo
 
     A coordinate is exactly 0, at or next to a quarter turn (where arms are singular) or a limit, between the
     limits or, unless `within_limits`, anywhere, because backends compute beyond limits too. A floating base
-    has any attitude, including half turns and attitudes next to them.
+    and ball joints have any attitude, including half turns and attitudes next to them.
     """
     checked_model(model)
     if not isinstance(within_limits, bool):
         raise DTypeError(f"within_limits is {shown(within_limits)}; wanted True or False")
+    if model.ball_joints:
+        return _with_ball_joints(model, within_limits)
     base = 7 if model.floating else 0
     joints = [
         _coordinate(joint.type == "prismatic", float(low), float(high), within_limits)
@@ -59,6 +61,22 @@ def configurations(model: Model, *, within_limits: bool = False) -> Strategy[Flo
         anywhere = st.tuples(vectors(2.0), quaternions(), values).map(np.concatenate)
     if within_limits:
         return anywhere
+    return st.one_of(st.just(model).map(Model.neutral), anywhere)
+
+
+def _with_ball_joints(model: Model, within_limits: bool) -> Strategy[Floats]:
+    parts: list[Strategy[Any]] = [vectors(2.0), quaternions()] if model.floating else []
+    for joint in model.coordinate_joints:
+        if joint.type == "ball":
+            parts.append(quaternions())
+        else:
+            k = model.position_index(joint.name)
+            low, high = float(model.lower[k]), float(model.upper[k])
+            own = _coordinate(joint.type == "prismatic", low, high, within_limits)
+            parts.append(own.map(lambda x: np.array([x])))
+    anywhere = st.tuples(*parts).map(np.concatenate)
+    if within_limits:
+        return anywhere.map(model.clip)
     return st.one_of(st.just(model).map(Model.neutral), anywhere)
 
 

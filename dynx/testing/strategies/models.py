@@ -90,6 +90,8 @@ def _rounded(x: float) -> float:
 T = TypeVar("T")
 BaseChoice = Literal["fixed", "floating", "either"]
 JOINT_TYPES: tuple[JointType, ...] = get_args(JointType)
+COMMON_JOINT_TYPES: tuple[JointType, ...] = tuple(kind for kind in JOINT_TYPES if kind != "ball")
+"""Types of joints with one coordinate at most, which all backends take."""
 MAX_LINKS = 64
 """Largest number of links. Larger robots find no further defects and take much longer."""
 
@@ -133,6 +135,7 @@ LIMITS: dict[JointType, Strategy[Limits]] = {
     # and shrink to the first type.
     "continuous": _limits(3.0).map(lambda dropped: Limits()),
     "prismatic": _limits(1.0),
+    "ball": st.just(Limits()) | numbers(3.5).map(lambda angle: Limits(0.0, abs(angle), 2.0, 50.0)),
 }
 DYNAMICS = optional(st.builds(JointDynamics, *[numbers(1.0).map(abs)] * 4, numbers(1.0))).map(
     lambda dynamics: dynamics or JointDynamics()
@@ -144,7 +147,7 @@ def models(
     min_links: int = 1,
     max_links: int = 7,
     base: BaseChoice = "either",
-    joint_types: Collection[str] = JOINT_TYPES,
+    joint_types: Collection[str] = COMMON_JOINT_TYPES,
     mimics: bool = True,
     locks: bool = True,
     physical: bool = True,
@@ -158,9 +161,10 @@ def models(
     friction and armature; further frames; gravity of any direction, or none; a fixed base at any pose.
 
     - `base`: ``"fixed"``, ``"floating"``, or ``"either"``
-    - `joint_types`: the kinds of joint that may occur
-    - `mimics`: whether some joints follow others, in chains too
-    - `locks`: whether some joints are locked, so that they leave the coordinates
+    - `joint_types`: the kinds of joint that may occur; by default all but ``"ball"``, which some backends
+      refuse
+    - `mimics`: whether some joints follow others, in chains too, of a robot without ball joints
+    - `locks`: whether some joints other than ball joints are locked, so that they leave the coordinates
     - `physical`: False adds inertia tensors that no body can have
     - `solvable`: every body has mass and extent in all directions, so that the mass matrix is
       positive definite at every configuration and forward dynamics has a solution
@@ -266,9 +270,10 @@ def _models(
     lock = {
         joint.name: limb.lock
         for joint, limb in zip(joints, limbs, strict=True)
-        if joint.moves and limb.lock is not None
+        if joint.moves and joint.type != "ball" and limb.lock is not None
     }
-    joints = _with_mimics(joints, [limb.mimic for limb in limbs])
+    if all(joint.type != "ball" for joint in joints):
+        joints = _with_mimics(joints, [limb.mimic for limb in limbs])
     if draw(st.booleans()):
         links, joints = draw(st.permutations(links)), draw(st.permutations(joints))
     model = Model.build(

@@ -14,6 +14,7 @@ from pathlib import PurePath
 import numpy as np
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import Inertial, Mimic, Note, Pose, Vector
 from dynx.model.geometry import LinkGeometry
 from dynx.model.loading import build_described
@@ -78,6 +79,9 @@ class _SceneReader:
 
     def scene(self) -> Scene:
         trees, reading = self._trees, self._reading
+        for tree in trees.trees:
+            if any(joint.type == "ball" for joint in tree.description.joints):
+                refuse_ball_joints(build_described(tree.description, self._source), "a scene")
         equalities = list(self._equalities())
         exported = [as_exported(tree) for tree in trees.trees]
         states = _states(trees, exported, self._keyframe)

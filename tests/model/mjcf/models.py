@@ -94,10 +94,24 @@ def joints(draw: Draw, names: Callable[[str], str]) -> str:
 
 
 @st.composite
+def ball_joints(draw: Draw, names: Callable[[str], str]) -> str:
+    unused = draw(st.sampled_from(["", ' axis="0 0 0"', ' ref="2"']))
+    text = f'<joint name="{names("j")}" type="ball"{unused}'
+    if draw(st.booleans()):
+        text += f' pos="{draw(vector(3))}"'
+    if draw(st.booleans()):
+        text += ' range="0 0.75"'
+    if draw(st.booleans()):
+        text += ' damping="0.3" frictionloss="0.1" armature="0.02" stiffness="3"'
+    return text + "/>"
+
+
+@st.composite
 def bodies(
     draw: Draw, names: Callable[[str], str], depth: int = 3, *, free: bool = False, balanced: bool = False
 ) -> str:
     parts = ["<freejoint/>"] if free else [draw(joints(names)) for _ in range(draw(st.integers(0, 3)))]
+    balls = [draw(ball_joints(names))] if not free and draw(st.integers(0, 3)) == 0 else []
     parts += [draw(geoms()) for _ in range(draw(st.integers(1, 2)))]
     if draw(st.booleans()):
         inertial = '<inertial pos="0.1 0 -0.2" mass="1.5" '
@@ -114,7 +128,9 @@ def bodies(
     wrapped = draw(st.sampled_from(["", "childclass"]))
     childclass = ' childclass="dense"' if wrapped else ""
     order = draw(st.permutations(range(len(parts))))
-    return f'<body name="{names("b")}"{draw(poses())}{childclass}>{"".join(parts[k] for k in order)}</body>'
+    # No joint that turns the body may follow a ball joint.
+    contents = "".join([*(parts[k] for k in order), *balls])
+    return f'<body name="{names("b")}"{draw(poses())}{childclass}>{contents}</body>'
 
 
 @st.composite
@@ -178,8 +194,13 @@ def compute(mujoco: Any, compiled: Any, seed: int, *, free: bool) -> Results:
     """Compute at a random state by MuJoCo."""
     random, data = np.random.default_rng(seed), mujoco.MjData(compiled)
     q = np.array(compiled.qpos0) + random.uniform(-1.0, 1.0, compiled.nq)
-    if free:
-        q[3:7] /= np.linalg.norm(q[3:7])
+    quaternions = [3] * free + [
+        int(compiled.jnt_qposadr[k])
+        for k in range(compiled.njnt)
+        if compiled.jnt_type[k] == mujoco.mjtJoint.mjJNT_BALL
+    ]
+    for first in quaternions:
+        q[first : first + 4] /= np.linalg.norm(q[first : first + 4])
     v, a = random.normal(size=(2, compiled.nv))
     data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
     for step in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_crb, mujoco.mj_comVel):
@@ -194,10 +215,11 @@ def compute(mujoco: Any, compiled: Any, seed: int, *, free: bool) -> Results:
         R = data.xmat[compiled.jnt_bodyid[0]].reshape(3, 3)
         turned = np.eye(compiled.nv)
         turned[:3, :3] = R.T
-        q[3:7] = q[[4, 5, 6, 3]]
         v[:3] = R.T @ v[:3]
         a[:3] = R.T @ a[:3] - np.cross(v[3:6], v[:3])
         M, tau = turned @ M @ turned.T, turned @ tau
+    for first in quaternions:
+        q[first : first + 4] = q[[first + 1, first + 2, first + 3, first]]
     return Results(
         q,
         v,

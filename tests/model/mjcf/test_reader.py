@@ -49,11 +49,13 @@ def test_random_models_are_read_as_mujoco_reads_them(text: str) -> None:
     assert list(model.joint_names) == [joint.name for joint in joints]
     for joint in joints:
         mine = model.joint(joint.name)
-        lower, upper = joint.range if compiled.jnt_limited[joint.id] else (-np.inf, np.inf)
+        # The angle of a ball joint is never below 0.
+        unlimited = (0.0 if mine.type == "ball" else -np.inf, np.inf)
+        lower, upper = joint.range if compiled.jnt_limited[joint.id] else unlimited
         require_close(
             np.array([mine.limits.lower, mine.limits.upper]), np.array([lower, upper])
-        ) if np.isfinite(lower) else None
-        assert np.isinf(lower) == np.isinf(mine.limits.lower)
+        ) if np.isfinite(upper) else None
+        assert np.isinf([lower, upper]).tolist() == np.isinf([mine.limits.lower, mine.limits.upper]).tolist()
         force = compiled.jnt_actfrcrange[joint.id][1] if compiled.jnt_actfrclimited[joint.id] else np.inf
         assert mine.limits.effort == force
         stated = (joint.damping[0], joint.frictionloss[0], joint.armature[0])
@@ -272,7 +274,18 @@ def test_the_base_is_the_files() -> None:
 
 WITHOUT = '<geom size="0.1"/>'
 FAULTS = {
-    "ball": ('axis="0 1 0"', 'type="ball"', UnsupportedFeatureError, "5: joint 'hinge' is a ball joint"),
+    "ball range": (
+        'axis="0 1 0"',
+        'type="ball" range="-1 1"',
+        DescriptionError,
+        "largest angle of a ball joint",
+    ),
+    "after ball": (
+        WITHOUT,
+        '<joint name="ball" type="ball"/><joint name="next"/>',
+        DescriptionError,
+        "6: joint 'next' turns the body 'link', which a ball joint turns already",
+    ),
     "flex": (WITHOUT, "<flexcomp/>", UnsupportedFeatureError, "6: dynx does not read <flexcomp>"),
     "two": (
         "</worldbody>",

@@ -475,7 +475,6 @@ XYZ = "<xyz>0 1 0</xyz>"
 FAULTS = {
     "version": ('"1.9"', '"1.3"', UnsupportedFeatureError, "1: the version of SDF is '1.3'"),
     "no version": (' version="1.9"', "", DescriptionError, "no attribute version"),
-    "ball": ('"revolute"', '"ball"', UnsupportedFeatureError, "5: joint 'hinge' is a ball joint"),
     "screw": ('"revolute"', '"screw"', UnsupportedFeatureError, "5: joint 'hinge' is a screw joint"),
     "gearbox": ('"revolute"', '"gearbox"', UnsupportedFeatureError, "5: joint 'hinge' is a gearbox joint"),
     "type": ('"revolute"', '"revolut"', DescriptionError, "'revolut'; did you mean 'revolute'"),
@@ -647,3 +646,24 @@ def test_the_urdf_of_a_model_from_sdf_is_the_same_robot() -> None:
     want = dynx.backend("reference", model).inverse_dynamics(q, v, a)
     require_close(dynx.backend("reference", again).inverse_dynamics(q, v, a), want)
     assert again.joint_names == model.joint_names
+
+
+def test_a_ball_joint_has_the_frame_of_the_joint_and_its_own_damping() -> None:
+    text = ARM.replace('"revolute"', '"ball"').replace(
+        f"<axis>{XYZ}</axis>",
+        f"<pose>0 0 0.25 0.5 0 0</pose><axis>{XYZ}<dynamics><damping>0.5</damping></dynamics></axis>",
+    )
+    model = dynx.load(text)
+    joint = model.joint("hinge")
+    assert (joint.type, joint.dynamics.damping, joint.limits.upper) == ("ball", 0.5, np.inf)
+    assert (model.nq, model.nv) == (4, 3)
+    quarter = np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)])
+    still, turned = (
+        dynx.backend("reference", model).forward_kinematics(q, "link") for q in (model.neutral(), quarter)
+    )
+    # The point of the joint stays where it is.
+    point = np.array([0.0, 0.0, 0.25, 1.0])
+    np.testing.assert_allclose(turned @ point, still @ point, rtol=0.0, atol=1e-15)
+    assert turned[0, 3] == pytest.approx(-0.25)
+    without = dynx.load(ARM.replace('"revolute"', '"ball"').replace(f"<axis>{XYZ}</axis>", ""))
+    assert without.joint("hinge").type == "ball"

@@ -1,0 +1,34 @@
+"""The refusal of ball joints by what takes robots whose joints have one coordinate each."""
+
+from __future__ import annotations
+
+from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
+from dynx.model.tree import Tree
+
+
+def refuse_ball_joints(tree: Tree, what: str) -> None:
+    """Raise UnsupportedFeatureError, which names the joint, if the robot has a ball joint.
+
+    `what` takes none, and says so: "inverse kinematics", "simulate".
+    """
+    if tree.ball_joints:
+        joint = tree.ball_joints[0]
+        raise UnsupportedFeatureError(_refusal(tree, what), source=_source(tree), line=joint.line)
+
+
+def refuse_ball_joints_of_backend(tree: Tree, backend: str) -> None:
+    """Raise EngineLimitError, which names the joint, if the robot has a ball joint."""
+    if tree.ball_joints:
+        raise EngineLimitError(_refusal(tree, f"the backend {shown(backend)}"))
+
+
+def _refusal(tree: Tree, what: str) -> str:
+    joint = tree.ball_joints[0].name
+    return (
+        f"{shown(joint)} of {tree.name} is a ball joint, which {what} does not take; the backends "
+        "'reference', 'pinocchio' and 'mujoco' do"
+    )
+
+
+def _source(tree: Tree) -> str | None:
+    return None if tree.source == "<memory>" else tree.source
