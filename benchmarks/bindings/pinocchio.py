@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from benchmarks.bindings.sample import FRAME, Call, Sample
 from dynx.model import Model
-from dynx.rbd.regressor import inertia_from_parameters, parameters_from_inertia
+from dynx.spatial.inertia import inertia_from_parameters, parameters_from_inertia
 from dynx.spatial.scalar import Floats
 
 

@@ -18,7 +18,6 @@ from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces, Quantity
 from dynx.errors import ArgumentError
 from dynx.model.numbers import checked_bool
 from dynx.rbd.jacobians import LOCAL, LOCAL_WORLD_ALIGNED, shift_jacobian
-from dynx.rbd.joint_wrenches import AppliedWrench, LinkWrenches
 from dynx.registry import door, explains_names
 from dynx.spatial.scalar import Floats
 
@@ -517,6 +516,8 @@ class Backend(QuantityCalls):
         axes = self._arguments.reference(reference)
         if forces is None and frame is None and axes == LOCAL:
             return wrenches
+        from dynx.rbd.joint_wrenches import AppliedWrench, LinkWrenches
+
         q = self._checked_q(q)
         T = self.forward_kinematics(q)
         found = LinkWrenches(self._mechanism, links, T[..., : len(self.model.links), :, :], wrenches)

@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dynx.model import Mechanism, Model
-from dynx.rbd import aba, centroidal, crba, jacobians, joint_wrenches, kinematics, regressor, rnea
+from dynx.rbd import aba, centroidal, crba, jacobians, kinematics, rnea
 from dynx.spatial.scalar import Array
 
 Algorithm = Callable[..., Array]
@@ -292,7 +292,7 @@ _TABLE = (
         ("q", "v", "a"),
         ("nv", "10 n_links"),
         "m/s^2, m^2/s^2, 1/s^2",
-        regressor.inertial_regressor,
+        _imported_late("dynx.rbd.regressor", "inertial_regressor"),
         "regressor",
         "Atkeson, An and Hollerbach 1986",
         _elsewhere("computeJointTorqueRegressor"),
@@ -306,7 +306,7 @@ _TABLE = (
         ("q", "v", "a"),
         ("n_joints", 6),
         "N, N m",
-        joint_wrenches.joint_wrenches,
+        _imported_late("dynx.rbd.joint_wrenches", "joint_wrenches"),
         "joint wrenches",
         "Featherstone 2008, table 5.1",
         _elsewhere(
@@ -319,7 +319,7 @@ _TABLE = (
         ("q", "v", "a"),
         (6,),
         "N, N m",
-        joint_wrenches.base_wrench,
+        _imported_late("dynx.rbd.joint_wrenches", "base_wrench"),
         "base wrench",
         "Featherstone 2008, table 5.1",
         options=_OF_WRENCHES,

@@ -20,12 +20,16 @@ from dynx.rbd.aba import ArticulatedInertia
 from dynx.rbd.base_parameters import Z_AXIS
 from dynx.rbd.loops import Columns, Loops, moving_frames
 from dynx.rbd.placement import Placement
-from dynx.rbd.regressor import inertia_from_parameters, parameters_from_inertia
 from dynx.simd.call_table import CallTable
 from dynx.simd.program import Port, Program, scalar_ranges
 from dynx.simd.routines import Place, Routine, RoutineSet
 from dynx.simd.trace import trace
-from dynx.spatial.inertia import RigidInertia, symmetric_from_upper
+from dynx.spatial.inertia import (
+    RigidInertia,
+    inertia_from_parameters,
+    parameters_from_inertia,
+    symmetric_from_upper,
+)
 from dynx.spatial.scalar import Array
 
 Step = Callable[..., Any]

@@ -54,7 +54,7 @@ def checked_q(tree: Tree, q: ArrayLike, name: str = "q") -> Floats:
         raise ShapeError(f"{error}: {base}{listed}{of_balls}") from None
     for first in tree.quaternions:
         quat = array[..., first : first + 4]
-        unit = checked_quaternion(name, quat, f"{first}:{first + 4}")
+        unit = checked_quaternion(name, quat, "3:7" if first == 3 else f"{first}:{first + 4}")
         if unit is not quat:
             array = np.concatenate([array[..., :first], unit, array[..., first + 4 :]], axis=-1)
     return array

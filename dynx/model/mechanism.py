@@ -215,7 +215,7 @@ class Mechanism:
 
     @cached_property
     def places(self) -> tuple[int, ...]:
-        """Index in q of each coordinate of the tree; of a ball joint and of a base, that of a number of its."""
+        """Index in q of each coordinate of the tree, and of any number of a base or of a ball joint."""
         places, at = [*range(6)] if self.floating else [], 7 if self.floating else 0
         for body in self.bodies:
             places.append(at)

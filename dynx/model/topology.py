@@ -29,7 +29,8 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def refuse_unbounded_numbers(links: Iterable[Link], joints: Iterable[Joint], source: str) -> None:
-    """Raise DescriptionError for a number that is not finite or not below `MAX_MAGNITUDE`.
+    """Raise DescriptionError for a number that is not finite or not below `MAX_MAGNITUDE`, and
+    UnsupportedFeatureError for a ball joint with a spring.
 
     Limits may be infinite, and are not part of any product.
     """
@@ -42,6 +43,13 @@ def refuse_unbounded_numbers(links: Iterable[Link], joints: Iterable[Joint], sou
             raise DescriptionError(
                 f"the largest angle of ball joint {shown(joint.name)} is {joint.limits.upper}; wanted at "
                 "least 0",
+                source=source,
+                line=joint.line,
+            )
+        if joint.type == "ball" and joint.dynamics.stiffness:
+            raise UnsupportedFeatureError(
+                f"ball joint {shown(joint.name)} has a spring of {joint.dynamics.stiffness:g} N m/rad; ball "
+                "joints have none in dynx",
                 source=source,
                 line=joint.line,
             )

@@ -23,8 +23,8 @@ from dynx.model.geometry import Geometry
 from dynx.model.mechanism import ROOT, Mechanism, build_mechanism
 from dynx.model.model import Model
 from dynx.model.numbers import MAX_MAGNITUDE, checked_array, checked_vector, is_real
-from dynx.rbd.regressor import PARAMETERS, inertia_from_parameters, link_inertia, parameters_from_inertia
-from dynx.spatial.inertia import RigidInertia
+from dynx.rbd.regressor import PARAMETERS, link_inertia
+from dynx.spatial.inertia import RigidInertia, inertia_from_parameters, parameters_from_inertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import skew
 

@@ -26,15 +26,12 @@ from dynx.model import Model
 from dynx.model.mechanism import Body, BodyFrame, Mechanism, ScalarConverter, float64, pose_arrays
 from dynx.rbd.kinematics import BodyPose, Poses, pose_pairs
 from dynx.rbd.loops import Loops, PythonLoops
-from dynx.spatial.inertia import RigidInertia, inertia_about_origin
+from dynx.spatial.inertia import RigidInertia, inertia_about_origin, parameters_from_inertia
 from dynx.spatial.scalar import Array, append_axis
 from dynx.spatial.so3 import cross, rotate, rotate_back, skew
 
 PARAMETERS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 """Names of the ten inertial parameters of a link, in order."""
-
-TENSOR_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-"""Row and column in the inertia tensor of each of the last six parameters."""
 
 
 def inertial_regressor(
@@ -208,21 +205,6 @@ def link_inertia(model: Model, link: str, convert: ScalarConverter = float64) ->
     inertial = model.inertial(link)
     R, p = pose_arrays(inertial.origin, convert)
     return inertia_about_origin(convert(inertial.mass), p, R, convert(inertial.tensor))
-
-
-def parameters_from_inertia(inertia: RigidInertia) -> Array:
-    """Return the ten parameters (..., 10) of a rigid body, about the origin of its frame."""
-    tensor = [inertia.rotational_inertia[..., i, j] for i, j in TENSOR_ENTRIES]
-    first_moment = [inertia.first_moment[..., k] for k in range(3)]
-    return np.stack([np.asarray(x) for x in (inertia.mass, *first_moment, *tensor)], axis=-1)
-
-
-def inertia_from_parameters(parameters: Array) -> RigidInertia:
-    """Return the inertia that has the ten `parameters` (..., 10)."""
-    tensor = {ij: parameters[..., 4 + k] for k, ij in enumerate(TENSOR_ENTRIES)}
-    rows = [[tensor[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
-    rotational_inertia = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-    return RigidInertia(np.asarray(parameters[..., 0]), parameters[..., 1:4], rotational_inertia)
 
 
 def _tensor_columns(w: Array) -> Array:

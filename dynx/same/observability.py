@@ -17,11 +17,11 @@ import numpy as np
 
 from dynx.model.mechanism import ROOT, BodyFrame, Mechanism
 from dynx.rbd.base_parameters import align_frames, split_inertia
-from dynx.rbd.regressor import inertial_regressor_at, parameters_from_inertia
+from dynx.rbd.regressor import inertial_regressor_at
 from dynx.same.decimals import rounded
 from dynx.same.scales import inertia_ratio
 from dynx.same.skeleton import Skeleton, float_inertia
-from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.inertia import RigidInertia, parameters_from_inertia
 from dynx.spatial.scalar import Floats
 
 STATES, SEED = 24, 0

@@ -13,6 +13,9 @@ import numpy as np
 from dynx.spatial.scalar import Array, append_axis
 from dynx.spatial.so3 import cross, rotate, skew
 
+TENSOR_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+"""Row and column in the inertia tensor of each of the last six parameters."""
+
 
 @dataclass(frozen=True)
 class RigidInertia:
@@ -72,6 +75,21 @@ def inertia_about_origin(mass: Array, center: Array, rotation: Array, tensor: Ar
     central = rotation @ tensor @ np.swapaxes(rotation, -1, -2)
     C, along = skew(center), append_axis(mass)
     return RigidInertia(np.asarray(mass), center * along, central - (C @ C) * append_axis(along))
+
+
+def parameters_from_inertia(inertia: RigidInertia) -> Array:
+    """Return the ten parameters (..., 10) of a rigid body, about the origin of its frame."""
+    tensor = [inertia.rotational_inertia[..., i, j] for i, j in TENSOR_ENTRIES]
+    first_moment = [inertia.first_moment[..., k] for k in range(3)]
+    return np.stack([np.asarray(x) for x in (inertia.mass, *first_moment, *tensor)], axis=-1)
+
+
+def inertia_from_parameters(parameters: Array) -> RigidInertia:
+    """Return the inertia that has the ten `parameters` (..., 10)."""
+    tensor = {ij: parameters[..., 4 + k] for k, ij in enumerate(TENSOR_ENTRIES)}
+    rows = [[tensor[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
+    rotational_inertia = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return RigidInertia(np.asarray(parameters[..., 0]), parameters[..., 1:4], rotational_inertia)
 
 
 _UPPER = np.array([[0, 0, 0], [0, 1, 1], [0, 1, 2]]), np.array([[0, 1, 2], [1, 1, 2], [2, 2, 2]])

@@ -89,7 +89,7 @@ FLOWS = {
         ),
         (),
         152,
-        24600,
+        25100,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
@@ -97,7 +97,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         104,
-        18750,
+        18850,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -107,7 +107,7 @@ FLOWS = {
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
         154,
-        26600,
+        26900,
     ),
 }
 

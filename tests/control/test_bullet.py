@@ -46,6 +46,7 @@ def stepper_of(robot: Model) -> BulletStepper:
         joint_damping=False,
         joint_friction=False,
         joint_armature=False,
+        joint_springs=False,
     )
     return BulletStepper(
         layout, 1e-3, {name: setting.default for name, setting in BulletStepper.settings.items()}

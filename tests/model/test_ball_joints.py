@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,7 +17,7 @@ from dynx.errors import (
     ShapeError,
     UnsupportedFeatureError,
 )
-from dynx.model import Inertial, Joint, Limits, Link, Mimic, Model
+from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model
 from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.conversion import convert
 from dynx.spatial.so3 import quat_log, quat_product
@@ -134,3 +136,24 @@ def test_formats_keep_ball_joints(data: st.DataObject) -> None:
     model = data.draw(robots())
     for form in ("mjcf", "sdf"):
         assert convert(model, form).differences == ()
+
+
+def test_springs_of_other_joints_take_their_positions_from_q() -> None:
+    """A ball joint has one number more in q than in v."""
+    hinge = replace(HINGE, dynamics=JointDynamics(stiffness=2.0, spring_reference=0.1))
+    slide = replace(SLIDE, dynamics=JointDynamics(stiffness=3.0))
+    masses = [Link(name, Inertial(1.0, ixx=0.1, iyy=0.1, izz=0.1)) for name in ("base", "a", "b", "c")]
+    model = Model.build("arm", masses, [hinge, BALL, slide])
+    engine = dynx.backend("reference", model)
+    q, zero = model.random(0), np.zeros(model.nv)
+    rigid = engine.inverse_dynamics(q, zero, zero)
+    springs = engine.inverse_dynamics(q, zero, zero, joint_dynamics=True) - rigid
+    expected = [2.0 * (q[0] - 0.1), 0.0, 0.0, 0.0, 3.0 * q[5]]
+    np.testing.assert_allclose(springs, expected, rtol=0.0, atol=1e-12)
+    energy = engine.potential_energy(q, joint_dynamics=True) - engine.potential_energy(q)
+    assert energy == pytest.approx((q[0] - 0.1) ** 2 + 1.5 * q[5] ** 2, abs=1e-12)
+
+
+def test_a_ball_joint_has_no_spring() -> None:
+    with pytest.raises(UnsupportedFeatureError, match="'ball' has a spring"):
+        Model.build("arm", LINKS, [HINGE, replace(BALL, dynamics=JointDynamics(stiffness=1.0)), SLIDE])

@@ -15,13 +15,12 @@ from dynx.rbd import rnea
 from dynx.rbd.kinematics import body_poses
 from dynx.rbd.regressor import (
     PARAMETERS,
-    inertia_from_parameters,
     inertial_parameters,
     inertial_regressor,
     link_inertia,
-    parameters_from_inertia,
 )
 from dynx.reference.backend import ReferenceBackend
+from dynx.spatial.inertia import inertia_from_parameters, parameters_from_inertia
 from dynx.spatial.scalar import Array
 from dynx.testing.strategies import models, samples
 from tests.backends.robots import BASES, assert_close, chain, mixed_robot, motion

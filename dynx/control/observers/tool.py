@@ -24,7 +24,8 @@ from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Model, Pose
 from dynx.model.numbers import checked_entries, checked_vector, real_array
 from dynx.rbd.parameters import Payload
-from dynx.rbd.regressor import PARAMETERS, FrameMotion, inertia_from_parameters
+from dynx.rbd.regressor import PARAMETERS, FrameMotion
+from dynx.spatial.inertia import inertia_from_parameters
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotate_back, skew
 

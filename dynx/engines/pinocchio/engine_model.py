@@ -12,7 +12,7 @@ from dynx.engines.pinocchio.library import pin
 from dynx.errors import DynxError, EngineError, EngineLimitError, nonblank_lines, shown
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, Pose
-from dynx.rbd.regressor import inertia_from_parameters, parameters_from_inertia
+from dynx.spatial.inertia import inertia_from_parameters, parameters_from_inertia
 from dynx.spatial.scalar import Floats
 
 MAX_NV = 200

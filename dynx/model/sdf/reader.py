@@ -507,6 +507,9 @@ class _RobotReader:
                 dynamics, f"the spring_stiffness of {what} is negative, so the spring pushes the joint away"
             )
         reference = reading.scalar(dynamics, "spring_reference", what, 0.0)
+        if stiffness and joint.element.attributes.get("type") == "ball":
+            reading.note(dynamics, f"the spring of {what} is not read: a ball joint has no spring in dynx")
+            stiffness = 0.0
         return JointDynamics(**values, armature=armature, stiffness=stiffness, spring_reference=reference)
 
     def _armature(self, joint: NamedPart) -> float:

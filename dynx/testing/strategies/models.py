@@ -305,11 +305,12 @@ def _limbs(
         if kind == "fixed":
             # A fixed joint has neither limits nor dynamics, and its axis has no meaning.
             return _Limb(*common, (1.0, 0.0, 0.0), Limits(), JointDynamics(), None, None)
+        dynamics = draw(DYNAMICS)
         return _Limb(
             *common,
             draw(AXES),
             draw(LIMITS[kind]),
-            draw(DYNAMICS),
+            replace(dynamics, stiffness=0.0) if kind == "ball" else dynamics,
             draw(optional(follow)) if mimics else None,
             draw(optional(numbers(1.0))) if locks else None,
         )
