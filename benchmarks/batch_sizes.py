@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         model = load(robot)
         for quantity in chosen.quantity or MIN_RATIO:
             print(f"{robot}, {quantity}")
-            print(f"{'samples':>8}{'call':>10}{'kernel':>10}{'pinocchio':>12}{'us more':>10}{'ratio':>10}")
+            print(f"{'samples':>8}{'call':>10}{'kernel':>10}{'pinocchio':>12}{'extra us':>10}{'ratio':>10}")
             rows = []
             for row in measure(model, quantity, chosen.batch or SIZES, chosen.repetitions):
                 print(row, flush=True)

@@ -60,11 +60,12 @@ class Baselines:
 def tables(found: Sequence[Found]) -> Iterator[str]:
     """Single loops, then batches.
 
-    ``tutorial / this`` is the speed-up of a step over the tutorial's loop, ``MuJoCo / this`` over MuJoCo's
-    rollout on as many threads. ``spread`` is the distance of the quartiles over the median.
+    A speed-up is that of a step, over the tutorial's loop or over MuJoCo's rollout on as many threads.
+    ``spread`` is the distance of the quartiles over the median.
     """
     baselines = Baselines.among(found)
-    yield "| one closed loop | us a step | spread | steps/s | tutorial / this | start [ms] | error [rad] |"
+    speed_up = "speed-up over the tutorial's loop"
+    yield f"| one closed loop | us a step | spread | steps/s | {speed_up} | start [ms] | error [rad] |"
     yield "|---|---|---|---|---|---|---|"
     for each in found:
         if each.single:
@@ -74,7 +75,8 @@ def tables(found: Sequence[Found]) -> Iterator[str]:
                 f"| {each.checks[0].error:.1e} |"
             )
     yield ""
-    yield "| batch | threads | rollouts | ns a step | spread | MuJoCo / this | tutorial / this | start [ms] |"
+    head = f"spread | speed-up over MuJoCo | {speed_up} | start [ms] |"
+    yield f"| batch | threads | rollouts | ns a step | {head}"
     yield "|---|---|---|---|---|---|---|---|"
     for each in found:
         if not each.single:

@@ -73,8 +73,8 @@ def batches_table(outputs: Sequence[str]) -> str:
             cells = (peer_cell(ways.get(name), own["ns"]) for name in peers)
             name = result["quantity"].replace("_", " ")
             rows.append((document["robot"], name, f"{own['ns']:.0f}", *cells, shares))
-    heads = ("Pinocchio's C++ batch", "a loop over its binding", "C++ part of that call")
-    return table(("robot", "quantity", "`compiled` [ns]", *heads, "of bandwidth / of arithmetic"), rows)
+    heads = ("Pinocchio's C++ batch", "Pinocchio's binding in a loop", "C++ part of a call")
+    return table(("robot", "quantity", "`compiled` [ns]", *heads, "bandwidth / arithmetic"), rows)
 
 
 def peer_cell(way: dict[str, Any] | None, own: float) -> str:

@@ -95,8 +95,8 @@ def main() -> None:
     parser.add_argument("arms", nargs="*", default=list(ARMS), help="names of arms")
     parser.add_argument("--paths", type=int, default=50, help="number of paths of each kind")
     options = parser.parse_args()
-    head = ["robot", "joint motions: OK / LIMITED / HELD / JUMPED [%]", "whole", "a sample [us]", "lines"]
-    head += ["whole", "a sample [us]", "whole with the start chosen", "a path [ms]"]
+    head = ["robot", "joint motions: statuses [%]", "all OK", "a sample [us]", "lines: statuses [%]"]
+    head += ["all OK", "a sample [us]", "lines, start chosen: all OK", "a path [ms]"]
     print("| " + " | ".join(head) + " |")
     print("|" + "---|" * len(head))
     for name in options.arms:

@@ -47,8 +47,8 @@ SETTINGS: Mapping[str, Setting] = {
     ),
     "slip_time_constant": Setting(
         0.01,
-        "time constant at which slip decays in contacts that stick [s], at least a step: smaller lets "
-        "bodies hop that slide",
+        "time constant at which slip decays in contacts that stick [s], at least a step: with a smaller "
+        "one, sliding bodies may hop",
         1e-6,
     ),
     "impedance": Setting(
@@ -68,7 +68,7 @@ SETTINGS: Mapping[str, Setting] = {
     ),
     "joint_friction_impedance": Setting(
         0.999,
-        "MuJoCo's solimp of joint friction, constant: joints that stick creep less the nearer it is to 1",
+        "MuJoCo's solimp of joint friction, constant: the nearer to 1, the less a joint creeps that sticks",
         0.0001,
         0.9999,
     ),

@@ -135,7 +135,7 @@ SETTINGS = {
         0.2, "time constant [s] of the removal of penetrations between surfaces that rebound", most=1e6
     ),
     "contact_distance": Setting(0.02, "distance [m] below which contact points are kept"),
-    "contact_slop": Setting(1e-5, "depth [m] to which a penetration is not removed", most=1.0),
+    "contact_slop": Setting(1e-5, "depth [m] of penetrations that the solver leaves as they are", most=1.0),
     "mesh_margin": Setting(
         0.0, "distance [m] by which the hull of a mesh or an ellipsoid is enlarged", most=1.0
     ),
