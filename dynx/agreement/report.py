@@ -132,6 +132,9 @@ class LoadFailure:
     type: str
     message: str
 
+    def __str__(self) -> str:
+        return f"{self.type}: {self.message}"
+
 
 @dataclass(frozen=True, repr=False)
 class AgreementReport:

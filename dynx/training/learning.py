@@ -44,6 +44,11 @@ class Progress:
     mean_return: float | None
     last_evaluation: Evaluation | None
 
+    def __str__(self) -> str:
+        """Return the line that ``progress=print`` prints."""
+        earned = "" if self.mean_return is None else f", mean return {self.mean_return:.4g}"
+        return f"{self.steps} of {self.total} steps{earned}"
+
 
 @checks_types
 @dataclass(frozen=True)

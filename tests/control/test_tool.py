@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dynx
-from dynx.control import PD, SensorMotion, identify_tool
-from dynx.errors import ArgumentError, ShapeError, UnknownNameError
+from dynx.control import PD, SensorMotion, Tool, identify_tool
+from dynx.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError
 from dynx.rbd.parameters import Payload, plant_model
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_quat
@@ -140,3 +140,16 @@ def test_readings_that_do_not_determine_a_tool() -> None:
         SensorMotion.at_rest(T[0, 0])
     with pytest.raises(UnknownNameError, match="tool0"):
         SensorMotion.of_robot(dynx.load("ur5"), "tool", np.zeros((3, 6)))
+
+
+def test_a_known_tool_needs_no_readings() -> None:
+    center = (0.01, 0.0, 0.05)
+    tool = Tool(0.9, center, np.eye(3) * 1e-3)  # type: ignore[arg-type]
+    rest = SensorMotion.at_rest(np.eye(4)[None])
+    up = np.array([0.0, 0.0, 0.9 * G])
+    np.testing.assert_allclose(tool.wrench(rest), [[*up, *np.cross(center, up)]], rtol=1e-12)
+    np.testing.assert_allclose(tool.compensate(tool.wrench(rest), rest), np.zeros((1, 6)), atol=1e-12)
+    with pytest.raises(ShapeError, match=r"center of a tool has shape \(2,\)"):
+        Tool(0.9, np.zeros(2))
+    with pytest.raises(DTypeError, match="mass"):
+        Tool("heavy", np.zeros(3))  # type: ignore[arg-type]

@@ -13,16 +13,16 @@ squares.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.backends import Backend, backend
-from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.errors import ArgumentError, DTypeError, ShapeError, shown
 from dynx.model import Model, Pose
-from dynx.model.numbers import checked_entries, checked_vector, real_array
+from dynx.model.numbers import checked_entries, checked_vector, is_real, real_array
 from dynx.rbd.parameters import Payload
 from dynx.rbd.regressor import PARAMETERS, FrameMotion
 from dynx.spatial.inertia import inertia_from_parameters
@@ -112,21 +112,33 @@ class SensorMotion:
 
 @dataclass(frozen=True, eq=False)
 class Tool:
-    """Tool that a force-torque sensor carries, and the bias of the sensor."""
+    """Tool that a force-torque sensor carries, and the bias of the sensor: identified (`identify_tool`), or
+    made from known data by the first three arguments."""
 
     mass: float
     """Mass [kg]."""
     center: Floats
     """Centre of mass (3,) in the sensor's frame [m]."""
-    inertia: Floats | None
+    inertia: Floats | None = None
     """Inertia (3, 3) about the centre of mass, in the sensor's axes [kg m^2]. None if it was not identified;
     `wrench` and `payload` then use zero."""
-    bias: Floats
+    bias: Floats = field(default_factory=lambda: np.zeros(6))
     """Force [N] and torque [N m] (6,) that the sensor reads without any load."""
-    condition: float
+    condition: float = 1.0
     """Condition number of the scaled equations: errors of readings may grow by this factor."""
-    residual: float
+    residual: float = 0.0
     """Root mean square of the differences between readings and fit [N, N m]."""
+
+    def __post_init__(self) -> None:
+        if not is_real(self.mass):
+            raise DTypeError(f"mass of a tool: got {shown(self.mass)}; wanted a number [kg]")
+        for name, shape in (("center", (3,)), ("bias", (6,)), ("inertia", (3, 3))):
+            if name == "inertia" and self.inertia is None:
+                continue
+            numbers = checked_entries(name, real_array(name, getattr(self, name)))
+            if numbers.shape != shape:
+                raise ShapeError(f"{name} of a tool has shape {numbers.shape}; wanted {shape}")
+            object.__setattr__(self, name, numbers)
 
     @checks_types
     def wrench(self, motion: SensorMotion) -> Floats:
