@@ -36,8 +36,8 @@ class Arguments:
         self.closed = False
         self._model = model
         self._floating = model.floating
-        # No array has the shape None: the quaternions of ball joints are checked one by one.
-        self._q_shape = None if model.ball_joints else (model.nq,)
+        # No array has the shape (-1,): the quaternions of ball joints are checked one by one.
+        self._q_shape = (-1,) if model.ball_joints else (model.nq,)
         self._v_shape = (model.nv,)
         self._listed = model.nq <= MAX_LISTED
 
