@@ -21,8 +21,8 @@ def assert_same_robot(a: Any, b: Any, *, attributes: Collection[str] = (), **opt
     `a`, `b` and the options are those of `dynx.same_robot`. `attributes` are kinds of differences apart from
     the verdict that must not occur either: ``"lower limit"``, ``"upper limit"``, ``"velocity limit"``,
     ``"effort limit"``, ``"damping"``, ``"friction"``, ``"armature"``, ``"stiffness"``,
-    ``"spring reference"``, ``"collision shapes"``, ``"visual shapes"``, ``"frame"``, ``"name"``,
-    ``"gravity"`` or ``"base pose"``. Raises AssertionError with a line for each element that differs,
+    ``"spring reference"``, ``"collision shapes"``, ``"visual shapes"``, ``"contact filter"``, ``"actuator"``,
+    ``"frame"``, ``"name"``, ``"gravity"`` or ``"base pose"``. Raises AssertionError with a line for each element that differs,
     UnknownNameError for another kind, and the errors of `dynx.same_robot`.
     """
     if not is_listed(attributes):

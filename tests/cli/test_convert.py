@@ -114,7 +114,7 @@ def test_what_was_not_read_is_named_apart_from_what_the_format_cannot_say(tmp_pa
     source.write_text(SERVO)
     result = run(source, "-o", out)
     assert result.exit_code == 0
-    for word in ("<actuator>", "stiffness", "arm.xml, line"):
+    for word in ("<actuator>", "<dynx_spring>", "arm.xml, line"):
         assert word in result.stderr
     assert "2 notes" in result.stdout
     found = json.loads(run(source, "-o", out, "--overwrite", "--json").stdout)

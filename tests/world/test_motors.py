@@ -125,7 +125,7 @@ def test_a_motor_at_the_end_of_a_step_acts_where_another_joint_moves_no_mass() -
 
 
 def prepare_robot(model: Model) -> RobotLayout:
-    off = ("collisions", "joint_limits", "joint_damping", "joint_friction", "joint_armature")
+    off = ("collisions", "joint_limits", "joint_damping", "joint_friction", "joint_armature", "joint_springs")
     return prepare(Scene(robots=(SceneRobot("r", model),)), **dict.fromkeys(off, False)).robots[0]
 
 

@@ -375,7 +375,7 @@ class Rollout:
             own += notes_on_held_joints([name for name, each in limits if each.lower == each.upper])
         if scenario is not None and scenario.joint_springs and not isinstance(scenario.plant, ScenePlant):
             steps = whole_number("substeps", scenario.substeps, 1)
-            acting = disturbances_of(scenario, model)
+            acting = disturbances_of(replace(scenario, pushes=()), model)
             own += notes_on_springs(acting, scenario.integrator, scenario.dt / steps, q)
         return tuple(dict.fromkeys((*own, *(self.surroundings.notes if self.surroundings else ()))))
 

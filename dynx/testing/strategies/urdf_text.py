@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from dynx.errors import ArgumentError
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.elements import INFINITY
+from dynx.model.urdf.reader import SPRING_TAG
 from dynx.testing.strategies.configurations import checked_model
 from dynx.testing.strategies.geometry import Strategy
 from dynx.testing.strategies.models import models
@@ -156,13 +157,17 @@ def _limit(joint: Joint, spellings: set[str]) -> list[_SpelledElement]:
 
 
 def _dynamics(joint: Joint, spellings: set[str]) -> list[_SpelledElement]:
-    # URDF has no armature, so the extension is written only for a joint that has one.
+    # URDF has no armature and no springs, so these extensions are written only for a joint that has one.
     always = ("damping", "friction") if "explicit_defaults" in spellings else ()
     values = ((name, getattr(joint.dynamics, name)) for name in ("damping", "friction", "armature"))
     given = [(name, value) for name, value in values if value or name in always]
-    if not joint.moves or not given:
-        return []
-    return [_SpelledElement("dynamics", [(name, _number(value, spellings)) for name, value in given])]
+    found = []
+    if joint.moves and given:
+        found += [_SpelledElement("dynamics", [(name, _number(value, spellings)) for name, value in given])]
+    if joint.moves and joint.dynamics.stiffness:
+        spring = (("stiffness", joint.dynamics.stiffness), ("reference", joint.dynamics.spring_reference))
+        found += [_SpelledElement(SPRING_TAG, [(name, _number(value, spellings)) for name, value in spring])]
+    return found
 
 
 def _mimic(joint: Joint, spellings: set[str]) -> list[_SpelledElement]:

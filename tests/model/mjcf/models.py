@@ -108,10 +108,16 @@ def ball_joints(draw: Draw, names: Callable[[str], str]) -> str:
 
 @st.composite
 def bodies(
-    draw: Draw, names: Callable[[str], str], depth: int = 3, *, free: bool = False, balanced: bool = False
+    draw: Draw,
+    names: Callable[[str], str],
+    depth: int = 3,
+    *,
+    free: bool = False,
+    balanced: bool = False,
+    with_balls: bool = True,
 ) -> str:
     parts = ["<freejoint/>"] if free else [draw(joints(names)) for _ in range(draw(st.integers(0, 3)))]
-    balls = [draw(ball_joints(names))] if not free and draw(st.integers(0, 3)) == 0 else []
+    balls = [draw(ball_joints(names))] if with_balls and not free and draw(st.integers(0, 3)) == 0 else []
     parts += [draw(geoms()) for _ in range(draw(st.integers(1, 2)))]
     if draw(st.booleans()):
         inertial = '<inertial pos="0.1 0 -0.2" mass="1.5" '
@@ -123,7 +129,7 @@ def bodies(
         parts.append(f"{inertial}{moments}{turned}/>")
     parts.append(f'<site name="{names("s")}"{draw(poses())}/>')
     for _ in range(draw(st.integers(0, 2 if depth else 0))):
-        below = draw(bodies(names, depth - 1, balanced=balanced))
+        below = draw(bodies(names, depth - 1, balanced=balanced, with_balls=with_balls))
         parts.append(draw(st.sampled_from([below, f"<frame{draw(poses())}>{below}</frame>"])))
     wrapped = draw(st.sampled_from(["", "childclass"]))
     childclass = ' childclass="dense"' if wrapped else ""

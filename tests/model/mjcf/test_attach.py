@@ -102,8 +102,9 @@ def require_same(path: Path, *, free: bool = False) -> dynx.Model:
     for got, wanted in pairs:
         np.testing.assert_allclose(got, wanted, rtol=0.0, atol=EXACT * (np.abs(wanted).max(initial=1.0)))
     joints = [joint for joint in model.joints if joint.moves]
-    np.testing.assert_array_equal([each.dynamics.damping for each in joints], compiled.dof_damping)
-    np.testing.assert_array_equal([each.dynamics.armature for each in joints], compiled.dof_armature)
+    rates = [each.dynamics for each in joints for _ in range(each.n_rates)]
+    np.testing.assert_array_equal([each.damping for each in rates], compiled.dof_damping)
+    np.testing.assert_array_equal([each.armature for each in rates], compiled.dof_armature)
     for k, each in enumerate(joints):
         if compiled.jnt_limited[k]:
             np.testing.assert_allclose((each.limits.lower, each.limits.upper), compiled.jnt_range[k])

@@ -64,6 +64,7 @@ CHANGES: dict[str, Any] = {
     "joint_friction": 0.3,
     "friction_slip": 2e-2,
     "joint_armature": np.full(6, 0.01),
+    "joint_springs": False,
     "effort_limits": True,
     "joint_limits": False,
     "payload": Payload("tool0", 1.0, center=(0.0, 0.0, 0.01)),

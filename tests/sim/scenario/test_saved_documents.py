@@ -29,7 +29,7 @@ FILE = Path(__file__).with_name("scenarios_before_options.json.gz")
 ROBOTS = next(iter(example_roots()), Path("absent"))
 TEXT = gzip.decompress(FILE.read_bytes()).decode().replace("{example-robot-data}", ROBOTS.parent.as_posix())
 SAVED: dict[str, Any] = json.loads(TEXT)
-ADDED: dict[str, Any] = {"sensors": []}
+ADDED: dict[str, Any] = {"sensors": [], "joint_springs": True}
 """Options that were added since, with their defaults."""
 
 

@@ -31,8 +31,8 @@ def scenes(draw: Draw) -> str:
         inside = "".join(draw(geoms()) for _ in range(draw(st.integers(1, 3))))
         return f'<body name="{names("b")}"{draw(poses())}>{joint}{inside}</body>'
 
-    parts = [draw(bodies(names, 1, free=True)) for _ in range(draw(st.integers(0, 2)))]
-    parts += [draw(bodies(names, 1)) for _ in range(draw(st.integers(0, 2)))]
+    parts = [draw(bodies(names, 1, free=True, with_balls=False)) for _ in range(draw(st.integers(0, 2)))]
+    parts += [draw(bodies(names, 1, with_balls=False)) for _ in range(draw(st.integers(0, 2)))]
     parts += [single(free=True) for _ in range(draw(st.integers(1, 3)))]
     parts += [single(free=False) for _ in range(draw(st.integers(0, 1)))]
     parts.append('<geom type="plane" size="1 1 1"/>')
