@@ -81,7 +81,8 @@ class HookEvaluation:
         else:
             result = self._one_by_one(hook, shape, samples, args)
         if self._coupling is not None and reduce is not None:
-            return reduce.of_batch(result)
+            # As in `of_sample`, so that the calls of one sample do not differ by rounding.
+            return reduce.of_batch(result) if batch else reduce.of_sample(result)
         return result
 
     def of_sample(self, function: Callable[..., Any], reduce: Reduction | None) -> Callable[..., Any]:

@@ -222,3 +222,14 @@ def test_a_hook_of_the_object_itself_replaces_that_of_the_class() -> None:
     vars(engine)["_gravity_torque"] = lambda q: np.full(3, 7.0)
     for _ in range(2):
         assert engine.gravity_torque(q).tolist() == [7.0, 7.0, 7.0]
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_the_first_call_has_the_bits_of_later_ones(name: str) -> None:
+    """Mimic joints are reduced by the products of the straight path from the first call on."""
+    model = mixed_robot("floating", mimic=True)
+    arrays = motion(model, 3)
+    for quantity in QUANTITIES.values():
+        with backend(name, model) as engine:
+            first = call_of(engine, quantity, *arrays).copy()
+            np.testing.assert_array_equal(call_of(engine, quantity, *arrays), first, err_msg=quantity.name)

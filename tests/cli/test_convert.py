@@ -116,7 +116,7 @@ def test_what_was_not_read_is_named_apart_from_what_the_format_cannot_say(tmp_pa
     assert result.exit_code == 0
     for word in ("<actuator>", "<dynx_spring>", "arm.xml, line"):
         assert word in result.stderr
-    assert "2 notes" in result.stdout
+    assert "1 note on reading" in result.stdout
     found = json.loads(run(source, "-o", out, "--overwrite", "--json").stdout)
     assert [*map(str, dynx.load(source).notes)] == found["source_notes"]
     assert not any("<actuator>" in each for each in found["notes"])

@@ -75,8 +75,8 @@ CHANGES: dict[str, Any] = {
 }
 """Another value of each field."""
 
-FREE = {"duration", "sensors"}
-"""Fields that may differ: no step depends on them."""
+FREE = {"duration", "sensors", "joint_springs"}
+"""Fields that may differ: no step depends on them. The robot has no springs."""
 
 WHOLE = simulate(SCENARIO)
 
@@ -84,7 +84,7 @@ WHOLE = simulate(SCENARIO)
 def test_every_field_has_another_value_here() -> None:
     assert set(CHANGES) == {each.name for each in fields(Scenario)}
     for name, value in CHANGES.items():
-        if name != "duration":
+        if name not in ("duration", "joint_springs"):
             assert replace(SCENARIO, **{name: value}) != SCENARIO, name
 
 
@@ -96,6 +96,18 @@ def test_another_value_of_any_field_is_refused_by_name(name: str) -> None:
     with pytest.raises(ArgumentError, match=rf"the rollout to resume .*{name}.*") as caught:
         simulate(other, resume=WHOLE)
     assert "now it is" in str(caught.value) or "not of" in str(caught.value)
+
+
+def test_a_robot_with_springs_is_resumed_with_springs() -> None:
+    model = load(
+        '<mujoco><worldbody><body name="arm"><joint name="j" stiffness="2"/><geom size="0.1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    options: dict[str, Any] = {"q0": [0.5], "duration": 0.01}
+    whole = simulate(model, **options)
+    np.testing.assert_array_equal(simulate(model, **options, resume=whole, step=3).q, whole.q)
+    with pytest.raises(ArgumentError, match="joint_springs True; now it is False"):
+        simulate(model, **options, joint_springs=False, resume=whole)
 
 
 def test_other_sensors_read_the_resumed_simulation() -> None:
