@@ -481,8 +481,8 @@ class Backend(QuantityCalls):
     def potential_energy(self, q: ArrayLike, *, joint_dynamics: bool = False) -> Floats:
         """Return the energy in the field of gravity (...,) [J], which is zero for mass at the world's origin.
 
-        Siciliano et al., section 7.1.2. Elsewhere: Pinocchio `computePotentialEnergy`, Drake
-        `CalcPotentialEnergy`, MuJoCo `mj_energyPos`.
+        With `joint_dynamics` it includes the energy of the joints' springs. Siciliano et al., section 7.1.2.
+        Elsewhere: Pinocchio `computePotentialEnergy`, Drake `CalcPotentialEnergy`, MuJoCo `mj_energyPos`.
         """
         energy = self._evaluate("potential_energy", (q,))
         if joint_dynamics is not False and checked_bool("joint_dynamics", joint_dynamics):

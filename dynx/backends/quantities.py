@@ -378,6 +378,7 @@ _TABLE = (
         "potential energy",
         "Siciliano et al., section 7.1.2",
         _elsewhere("computePotentialEnergy", "CalcPotentialEnergy", "mj_energyPos"),
+        options=("joint_dynamics",),
     ),
 )
 
