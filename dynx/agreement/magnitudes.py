@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 
 from dynx.agreement.sampling import FrameSamples, Samples
-from dynx.model.mechanism import ROOT
+from dynx.model.mechanism import ROOT, joint_entries
 from dynx.rbd.kinematics import ancestry, body_poses
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.inertia import RigidInertia
@@ -49,7 +49,7 @@ class Magnitudes:
         coupling = self._mechanism.coupling
         self._S = np.eye(self._mechanism.nv) if coupling is None else coupling.matrix()
         self._q_tree = samples.q if coupling is None else coupling.expand_q(samples.q)
-        self._joint_q = self._mechanism.joint_entries(self._q_tree)
+        self._joint_q = joint_entries(self._mechanism, self._q_tree)
         base = [False] * 3 + [True] * 3 if samples.model.floating else []
         self._rotates = np.array(base + [body.revolute for body in self._mechanism.bodies], dtype=bool)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from dynx.model import Model
 from dynx.model.elements import JointSprings
+from dynx.model.mechanism import springs_of
 from dynx.spatial.scalar import Floats
 
 
@@ -37,7 +38,7 @@ class JointDynamicsTerms:
         self.springs: JointSprings | None = None
         """Springs of the model's coordinates; None if no joint has one."""
         if self.stiffness.any():
-            self.springs = model.mechanism.springs(self.stiffness, self._references)
+            self.springs = springs_of(model.mechanism, self.stiffness, self._references)
         self.has_armature = bool(np.any(self.rotors != 0.0))
 
     @cached_property

@@ -164,54 +164,10 @@ class Mechanism:
         """Number of the first of the three bodies of each ball joint."""
         return tuple(k for k, body in enumerate(self.bodies) if body.ball == 0)
 
-    def rate_products(self, v: Array) -> Array:
-        """Return by how much accelerations (..., nv) of ball joints exceed those of three joints in a row
-        with the same motion, at the tree velocity v (..., nv); zero for other coordinates.
-
-        It is the sum of e_i x e_j w_i w_j over i < j, with the angular velocity w of a ball joint in the axes
-        e of its child: of three joints in a row, joint i carries the axis of joint j.
-        """
-        columns = [0 * v[..., k] for k in range(v.shape[-1])]
-        for ball in self.balls:
-            first = v.shape[-1] - len(self.bodies) + ball
-            x, y, z = (v[..., first + k] for k in range(3))
-            columns[first : first + 3] = [y * z, -(x * z), x * y]
-        return np.stack(columns, axis=-1)
-
-    def joint_entries(self, x: Array) -> list[Array]:
-        """Return the entries (...,) for each body's joint of a tree configuration or velocity (..., n); those
-        of a ball joint in a configuration are its quaternion (..., 4)."""
-        end, n = x.shape[-1], len(self.bodies)
-        if not self.balls or end != self.nq:
-            return [np.asarray(x[..., k]) for k in range(end - n, end)]
-        entries, at = [], 7 if self.floating else 0
-        for body in self.bodies:
-            if body.ball is None:
-                entries.append(np.asarray(x[..., at]))
-                at += 1
-            else:
-                entries.append(np.asarray(x[..., at : at + 4]))
-                at += 4 * (body.ball == 2)
-        return entries
-
     @cached_property
     def has_mass(self) -> bool:
         """True if any body has mass."""
         return any(inertia.mass != 0 for inertia in (self.root, *(b.inertia for b in self.bodies)))
-
-    def springs(self, stiffness: Array, reference: Array) -> JointSprings:
-        """Return the springs of the model's coordinates, from those of the tree (..., n), for any scalar.
-
-        That of a mimic joint acts on its driver through its multiplier.
-        """
-        preload = stiffness * reference
-        if self.coupling is not None:
-            S = self.coupling.matrix()[-len(self.coupling.index) :, -self.coupling.n_joints :]
-            preload = (preload - stiffness * np.array(self.coupling.offset)) @ S
-            stiffness = stiffness @ S**2
-        base = np.zeros((*stiffness.shape[:-1], 6 if self.floating else 0))
-        stiffness, preload = (np.concatenate([base, each], axis=-1) for each in (stiffness, preload))
-        return JointSprings(stiffness, preload, self.places if self.balls else None)
 
     @cached_property
     def places(self) -> tuple[int, ...]:
@@ -254,6 +210,53 @@ def stacked_poses(poses: Sequence[Pose], convert: ScalarConverter) -> tuple[Arra
     """Return rotations (n, 3, 3) and positions (n, 3) of poses, in the scalar type of `convert`."""
     rpy, xyz = convert([pose.rpy for pose in poses]), convert([pose.xyz for pose in poses])
     return rotation_from_rpy(rpy.reshape(-1, 3)), xyz.reshape(-1, 3)
+
+
+def rate_products(mechanism: Mechanism, v: Array) -> Array:
+    """Return by how much accelerations (..., nv) of ball joints exceed those of three joints in a row
+    with the same motion, at the tree velocity v (..., nv); zero for other coordinates.
+
+    It is the sum of e_i x e_j w_i w_j over i < j, with the angular velocity w of a ball joint in the axes
+    e of its child: of three joints in a row, joint i carries the axis of joint j.
+    """
+    columns = [0 * v[..., k] for k in range(v.shape[-1])]
+    for ball in mechanism.balls:
+        first = v.shape[-1] - len(mechanism.bodies) + ball
+        x, y, z = (v[..., first + k] for k in range(3))
+        columns[first : first + 3] = [y * z, -(x * z), x * y]
+    return np.stack(columns, axis=-1)
+
+
+def joint_entries(mechanism: Mechanism, x: Array) -> list[Array]:
+    """Return the entries (...,) for each body's joint of a tree configuration or velocity (..., n); those
+    of a ball joint in a configuration are its quaternion (..., 4)."""
+    end, n = x.shape[-1], len(mechanism.bodies)
+    if not mechanism.balls or end != mechanism.nq:
+        return [np.asarray(x[..., k]) for k in range(end - n, end)]
+    entries, at = [], 7 if mechanism.floating else 0
+    for body in mechanism.bodies:
+        if body.ball is None:
+            entries.append(np.asarray(x[..., at]))
+            at += 1
+        else:
+            entries.append(np.asarray(x[..., at : at + 4]))
+            at += 4 * (body.ball == 2)
+    return entries
+
+
+def springs_of(mechanism: Mechanism, stiffness: Array, reference: Array) -> JointSprings:
+    """Return the springs of the model's coordinates, from those of the tree (..., n), for any scalar.
+
+    That of a mimic joint acts on its driver through its multiplier.
+    """
+    preload = stiffness * reference
+    if mechanism.coupling is not None:
+        S = mechanism.coupling.matrix()[-len(mechanism.coupling.index) :, -mechanism.coupling.n_joints :]
+        preload = (preload - stiffness * np.array(mechanism.coupling.offset)) @ S
+        stiffness = stiffness @ S**2
+    base = np.zeros((*stiffness.shape[:-1], 6 if mechanism.floating else 0))
+    stiffness, preload = (np.concatenate([base, each], axis=-1) for each in (stiffness, preload))
+    return JointSprings(stiffness, preload, mechanism.places if mechanism.balls else None)
 
 
 @checks_types

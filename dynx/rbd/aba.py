@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynx.model.mechanism import Body, Mechanism
+from dynx.model.mechanism import Body, Mechanism, rate_products
 from dynx.rbd.linear import solve_positive_definite
 from dynx.rbd.loops import Loops, PythonLoops
 from dynx.rbd.placement import Placement, SpatialVector
@@ -135,7 +135,7 @@ def forward_dynamics(
     if mechanism.floating:
         base = loops.root(_without_gravity, root, base)
     found = loops.vector(base, a, like=v)
-    return found + mechanism.rate_products(v) if mechanism.balls else found
+    return found + rate_products(mechanism, v) if mechanism.balls else found
 
 
 def _root_motion(mechanism: Mechanism, q: Array, v: Array) -> LocalMotion:

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from dynx.model.mechanism import ROOT, BodyFrame, Mechanism
+from dynx.model.mechanism import ROOT, BodyFrame, Mechanism, joint_entries
 from dynx.spatial.scalar import Array, append_axis
 
 State = TypeVar("State")
@@ -277,7 +277,7 @@ class PythonLoops(Loops):
         values = []
         for column in columns:
             if isinstance(column, np.ndarray):
-                values.append(self.mechanism.joint_entries(column))
+                values.append(joint_entries(self.mechanism, column))
             else:
                 values.append(column[len(column) - n :])
         return list(zip(*values, strict=True))

@@ -20,7 +20,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model.elements import Inertial, Joint, JointCoefficients, JointDynamics, Link, Pose
 from dynx.model.geometry import Geometry
-from dynx.model.mechanism import ROOT, Mechanism, build_mechanism
+from dynx.model.mechanism import ROOT, Mechanism, build_mechanism, springs_of
 from dynx.model.model import Model
 from dynx.model.numbers import MAX_MAGNITUDE, checked_array, checked_vector, is_real
 from dynx.rbd.regressor import PARAMETERS, link_inertia
@@ -167,7 +167,7 @@ class Parameters:
         columns = [rows[..., k::n] for k in range(n)]
         springs, spring = None, columns[len(JOINT) :]
         if spring and (values.dtype == object or spring[0].any()):
-            springs = self.model.mechanism.springs(*spring)
+            springs = springs_of(self.model.mechanism, *spring)
         damping, friction, armature = (
             np.concatenate([base, each], axis=-1) for each in columns[: len(JOINT)]
         )

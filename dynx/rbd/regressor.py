@@ -23,7 +23,15 @@ import numpy as np
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.mechanism import Body, BodyFrame, Mechanism, ScalarConverter, float64, pose_arrays
+from dynx.model.mechanism import (
+    Body,
+    BodyFrame,
+    Mechanism,
+    ScalarConverter,
+    float64,
+    pose_arrays,
+    rate_products,
+)
 from dynx.rbd.kinematics import BodyPose, Poses, pose_pairs
 from dynx.rbd.loops import Loops, PythonLoops
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin, parameters_from_inertia
@@ -122,7 +130,7 @@ def body_states(
 ) -> tuple[Sequence[BodyKinematics], Sequence[Array]]:
     """Return the state of every body, the root's first, and the axes (..., 3) of the joints in the world."""
     if loops.mechanism.balls:
-        a = a - loops.mechanism.rate_products(v)
+        a = a - rate_products(loops.mechanism, v)
     return loops.outward(_move, loops.root(_root_state, poses[0], v, a), poses, v, a)
 
 

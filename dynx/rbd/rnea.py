@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynx.model.mechanism import Body, Mechanism
+from dynx.model.mechanism import Body, Mechanism, rate_products
 from dynx.rbd.loops import Loops, PythonLoops
 from dynx.rbd.placement import Placement, SpatialVector
 from dynx.spatial.inertia import RigidInertia
@@ -85,7 +85,7 @@ def inverse_dynamics(
     """
     loops = loops or PythonLoops(mechanism)
     if mechanism.balls:
-        a = a - mechanism.rate_products(v)
+        a = a - rate_products(mechanism, v)
     root = loops.root(root_motion, q, v, a)
     root_wrench = loops.root(_root_wrench, root)
     _, moved = loops.outward(_move, root, q, v, a)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dynx.model import Model
 from dynx.model.elements import Joint, JointCoefficients, JointSprings
 from dynx.model.geometry import Shape
+from dynx.model.mechanism import springs_of
 from dynx.spatial.scalar import Floats
 from dynx.steppers.material import Material
 
@@ -89,7 +90,7 @@ class RobotLayout:
         """Springs of the model's coordinates; None if no joint has one."""
         if not self.stiffness.any():
             return None
-        return self.model.mechanism.springs(self.stiffness, self.spring_reference)
+        return springs_of(self.model.mechanism, self.stiffness, self.spring_reference)
 
     def coefficients(self) -> JointCoefficients:
         """Return the coefficients (nv,) of the model's coordinates: those of a mimic joint act on its driver
