@@ -232,7 +232,7 @@ class JointDynamics:
     spring_reference: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.stiffness == 0.0:
+        if isinstance(self.stiffness, float | int) and self.stiffness == 0.0:
             object.__setattr__(self, "spring_reference", 0.0)
 
 
