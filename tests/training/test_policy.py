@@ -248,7 +248,8 @@ def test_policies_of_earlier_versions_keep_their_robots(trained: Path, tmp_path:
         path = written(tmp_path / "told.zip", {**parts, DOCUMENT: json.dumps(changed).encode()})
         return read_policy_document(path).spec.task
 
-    off = dict.fromkeys(("joint_damping", "joint_friction", "joint_armature", "joint_limits"), False)
+    terms = ("damping", "friction", "armature", "springs", "limits")
+    off = dict.fromkeys((f"joint_{each}" for each in terms), False)
     assert task("dynx.policy/1", "dynx/Reach-v0", robot="panda").options == {**off, "robot": "panda"}
     assert task("dynx.policy/1", "dynx/Reach-v0", **off, robot="panda").options == {**off, "robot": "panda"}
     limitless = {"joint_limits": False, "robot": "panda"}
