@@ -339,7 +339,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Actuator:
-    """What drives a joint, as a description states it. It is data: no robot that dynx moves has actuators.
+    """Actuator of a joint, as a robot description states it. It is data: dynx applies no actuator.
 
     Of the command u and of the position q and velocity v of the joint follow the force
     ``f = gain u + bias[0] + bias[1] gear q + bias[2] gear v`` and the effort ``gear f`` [N m or N], as in

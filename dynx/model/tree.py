@@ -40,9 +40,9 @@ class Tree:
     source: str = field(default="<memory>", compare=False)
     geometry: Geometry = field(default=NO_GEOMETRY, compare=False)
     actuators: tuple[Actuator, ...] | None = field(default=None, compare=False)
-    """What drives the joints; None where the description leaves it open."""
+    """Actuators of the joints, as data; None if the description format has none, as URDF and SDF."""
     contact_filter: ContactFilter | None = field(default=None, compare=False)
-    """Which shapes may touch; None where the description leaves it open."""
+    """Which collision shapes may touch; None if the description format does not say, as URDF and SDF."""
 
     def __post_init__(self) -> None:
         if self.floating and self.base_pose != IDENTITY:

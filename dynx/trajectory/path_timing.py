@@ -61,7 +61,7 @@ class EffortLimits:
     limit: Floats
     """Largest torque or force of each coordinate (nv,) [N m or N]; infinity means no limit."""
     joint_dynamics: bool
-    """Whether damping, dry friction, armature and springs of the description count."""
+    """True if damping, dry friction, armature and springs of the robot description are included."""
 
     @property
     def is_viscous(self) -> bool:

@@ -40,8 +40,8 @@ SHORTEST_STEP = 1e-9
 
 
 JointDynamics = bool
-"""Whether joints have the damping, friction, armature or springs of the robot's description: a world has no
-others."""
+"""True if joints have the damping, friction, armature or springs of the robot description; a world takes no
+other values."""
 
 
 def checked_options(dt: float, substeps: int, **switches: bool) -> dict[str, Any]:

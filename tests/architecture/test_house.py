@@ -38,7 +38,7 @@ def layers(text: str) -> list[list[str]]:
 
 
 def test_nothing_else_lies_at_top_level() -> None:
-    """What an example or a test left in the folder has been committed before."""
+    """The output of an example was once committed by mistake."""
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
     if listed.returncode != 0:
         pytest.skip("not a clone")

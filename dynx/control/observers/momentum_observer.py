@@ -136,7 +136,7 @@ class MomentumObserver(ModelEvaluation):
         residual, momentum, rate, begun = state[:nv], state[nv : 2 * nv], state[2 * nv : 3 * nv], state[-1:]
         dynamics = self.dynamics
         M, C = dynamics.mass_matrix(q), dynamics.coriolis_matrix(q, v)
-        p, b = self._terms(M, C, self._held(q, dynamics.gravity_torque(q)), v)
+        p, b = self._terms(M, C, self._static_torque(q, dynamics.gravity_torque(q)), v)
         external = (p - momentum) / dt - tau - 0.5 * (rate + b)
         left = np.exp(-dt * self.gain)
         return np.concatenate([begun * (left * residual + (1.0 - left) * external), p, b, 0.0 * begun + 1.0])
@@ -172,7 +172,7 @@ class MomentumObserver(ModelEvaluation):
             raise ArgumentError(f"t[{k + 1}] is {times[k + 1]:g}, not after t[{k}], {times[k]:g}")
         engine = self._backend
         M, C = engine.mass_matrix(q), engine.coriolis_matrix(q, v)
-        p, b = self._terms(M, C, self._held(q, engine.gravity_torque(q)), v)
+        p, b = self._terms(M, C, self._static_torque(q, engine.gravity_torque(q)), v)
         external = np.diff(p, axis=0) / steps[:, None] - tau - 0.5 * (b[:-1] + b[1:])
         left = np.exp(-steps[:, None] * self.gain)
         found = np.zeros((n + 1, model.nv))
@@ -208,7 +208,7 @@ class MomentumObserver(ModelEvaluation):
 
     # -- terms of the equations of motion -----------------------------------------------------
 
-    def _held(self, q: Array, g: Array) -> Array:
+    def _static_torque(self, q: Array, g: Array) -> Array:
         """Return the torque (..., nv) that holds the robot at rest at q against gravity `g` and springs."""
         return g if self.springs is None else g - self.springs.torque(q)
 

@@ -13,7 +13,7 @@ from dynx.model.xml.reading import Element
 
 @dataclass(frozen=True)
 class StatedContacts:
-    """What ``<contact>`` and the flags of a file say, in the names of its bodies and geoms."""
+    """Excluded pairs of bodies, pairs of geoms, and flags of contact that a file states, by its own names."""
 
     excluded: Mapping[tuple[str, str], Element]
     paired: Mapping[tuple[str, str], Element]
