@@ -1,8 +1,8 @@
 """Modules that a fresh process loads until a first result: which rooms, how many modules, how many lines.
 
 A ceiling is what was measured when it was last set, within `SLACK`. A flow that loads clearly less lowers it.
-It rises only for new physics that every robot may have, as for springs and ball joints. `loaded_now` are the exceptions: what is still loaded of the rooms that a flow does
-not need. An entry is deleted with its imports.
+It rises only for new physics that every robot may have, as for springs and ball joints. `loaded_now` are the
+exceptions: what is still loaded of the rooms that a flow does not need. An entry is deleted with its imports.
 """
 
 from __future__ import annotations
