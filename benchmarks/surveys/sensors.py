@@ -618,6 +618,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             measure = {"motion": motion, "observer": observe, "tool": hold_tool}[part]
             for number, name in enumerate(chosen.robots):
                 for base in BASES:
+                    print(f"{part}: {name}, {base} base", file=sys.stderr, flush=True)
                     measure(name, base, number, worst)
         print(f"\n{part}: largest figures, bar {BARS[part]:g}")
         for what, (figure, where) in worst.items():
