@@ -52,7 +52,7 @@ def picture(title: str, sentence: str, suffix: str = ".png") -> Callable[..., Ca
     return add
 
 
-@picture("Arm", "A UR5, with the shadow of the key light, on tiles of known size.")
+@picture("Arm", "A UR5 with a soft shadow, on a floor with tiles of 1 m and 0.2 m.")
 def arm(path: str) -> None:
     q = [0.6, -1.2, 1.6, -2.0, -1.57, 0.3]
     with dynx.load("ur5").view(q=q, whole_meshes=True) as viewer:
@@ -182,7 +182,9 @@ def gravity_torques(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("Manipulability", "Velocities of the flange for all joint velocities of norm 1: an ellipsoid.")
+@picture(
+    "Manipulability", "The ellipsoid has the velocities of the flange for all joint velocities of norm 1."
+)
 def manipulability(path: str) -> None:
     with dynx.load("ur5").view(q=[0.6, -0.9, 1.2, -1.8, -1.57, 0.3], whole_meshes=True) as viewer:
         viewer.set_shown("manipulability")
@@ -205,7 +207,7 @@ def names(path: str) -> None:
         viewer.export(path, size=SIZE, direction=(1.0, 0.4, 0.4))
 
 
-@picture("A path", "The path of the tip of a double pendulum: a program draws the line.", ".webp")
+@picture("A path", "The program adds the path of the tip of a double pendulum to the film.", ".webp")
 def path_of_a_tip(path: str) -> None:
     rollout = dynx.simulate(
         dynx.load("dynx_double_pendulum", base_pose=dynx.Pose((0.0, 0.0, 2.2))),
@@ -252,7 +254,7 @@ def duck(path: str) -> None:
             viewer.export(path, size=SIZE)
 
 
-@picture("Mobile robot", "TIAGo, and a text that the program writes.")
+@picture("Mobile robot", "TIAGo with words that the program adds.")
 def mobile_robot(path: str) -> None:
     with dynx.load("tiago").view(whole_meshes=True) as viewer:
         viewer.text("TIAGo", (0.35, 0.4, 0.9), colour="blue", size=26)
@@ -261,12 +263,12 @@ def mobile_robot(path: str) -> None:
 
 HEAD = """# Gallery
 
-The program below each picture or film draws it. The viewer of dynx needs no browser and no graphics processor
-for this. The programs need the extras `viewer`, `world`, `film`, `mujoco` and `drake`. A program takes up to
-two minutes; `python -m docs.gallery` runs all programs.
+The program below each picture or film draws it, without a browser and without a graphics processor. The
+programs need the extras `viewer`, `world`, `film` and `mujoco`. A program takes up to two minutes.
+`python -m docs.gallery` runs all programs.
 
-dynx also plays Gymnasium's own lander (extra `box2d`). This environment draws its own pictures, so it is not
-on this page.
+`dynx play` also shows Gymnasium's own lander (extra `train`). This environment draws its own pictures, so it
+is not on this page.
 """
 
 

@@ -21,7 +21,7 @@ from dynx.steppers.layout import Layout
 from dynx.steppers.settings import Setting
 
 STRICT_MATERIALS = Setting(
-    False, "whether a scene with coefficients of contact that the engine cannot have is refused"
+    False, "True: dynx refuses a scene with contact coefficients that the engine cannot represent"
 )
 """The setting `strict_materials`, which every engine has."""
 

@@ -385,8 +385,9 @@ class World:
 
         They follow from the state before the step, its acceleration, the external forces, the contacts and
         `constraint_wrenches`. The component along the axis of a joint is its `torque` plus its
-        `limit_torque`. `Backend.joint_wrenches` describes the order, the signs and the options. `robot` may
-        be left out if the scene has one.
+        `limit_torque`, less what damping, friction, armature and springs of the joint take of them.
+        `Backend.joint_wrenches` describes the order, the signs and the options. `robot` may be left out if
+        the scene has one.
 
         Raises ArgumentError without `keep_last_step`, or if no step was taken since the state was set.
         """

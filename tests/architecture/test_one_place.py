@@ -1,4 +1,4 @@
-"""Ideas that stand once: docs/architecture.md names the module of each, and no other module has it."""
+"""Ideas implemented in one place: docs/architecture.md names the module of each; no other module has it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ IDEAS = {
     "joint friction": r"^class FrictionLaw\b",
     "a step of a robot by a backend": r"^class RobotStep\b",
     "parameters in which robots differ": r"^class Parameters\b|^def plant_model\b",
-    "what joints transmit": r"^def joint_wrenches\b",
+    "joint wrenches": r"^def joint_wrenches\b",
     "external torque from a motion": r"^class MomentumObserver\b",
     "acceleration from two states": r"^class MeanAcceleration\b",
     "mean contacts": r"^class ContactInterval\b",
@@ -46,6 +46,8 @@ def test_an_idea_stands_in_one_module(idea: str) -> None:
 
 def _table() -> dict[str, str]:
     """Return the module of each idea in the table of docs/architecture.md."""
-    text = (ROOT / "docs/architecture.md").read_text("utf-8").partition("## Ideas that stand once")[2]
+    text = (
+        (ROOT / "docs/architecture.md").read_text("utf-8").partition("## Ideas implemented in one place")[2]
+    )
     rows = re.findall(r"^\| ([^|`]+) \| `([\w/]+\.py)` \|", text.partition("\n## ")[0], re.MULTILINE)
     return dict(rows)

@@ -68,7 +68,7 @@ SETTINGS: Mapping[str, Setting] = {
     ),
     "joint_friction_impedance": Setting(
         0.999,
-        "MuJoCo's solimp of joint friction, constant: the nearer to 1, the less a joint creeps that sticks",
+        "MuJoCo's impedance of joint friction: nearer to 1, a sticking joint creeps less",
         0.0001,
         0.9999,
     ),

@@ -139,7 +139,9 @@ SETTINGS = {
     "mesh_margin": Setting(
         0.0, "distance [m] by which the hull of a mesh or an ellipsoid is enlarged", most=1.0
     ),
-    "constraint_force": Setting(1e6, "largest force [N] or moment [N m] of welds and points", most=1e12),
+    "constraint_force": Setting(
+        1e6, "largest force [N] or moment [N m] of welds and point-to-point constraints", most=1e12
+    ),
     "link_damping": Setting(
         0.0, "damping [1/s] of the motion of every link and body, which Bullet by itself sets to 0.04"
     ),

@@ -6,10 +6,10 @@ With h_i the axes of the joints as they stand at the solution, a chain whose wri
 2, 3 and 4 are parallel) has the branches
 
 - shoulder right, if the wrist centre (the point where axes 5 and 6 meet) lies on that side of axis 1 to which
-h_1 x h_2 points, and otherwise shoulder left; - elbow up, if axis 3 passes on the side of h_1 of the line
-from axis 2 to the wrist centre (to axis 4) when that line points to the right; seen from the left it then
-passes on the opposite side. Otherwise elbow down; - wrist unflipped, if h_5' (h_4 x h_6) > 0, and otherwise
-wrist flipped.
+h_1 x h_2 points, and otherwise shoulder left;
+- elbow up, if axis 3 passes the line from axis 2 to the wrist centre (to axis 4) on the side of h_1. If the
+line points to the left for shoulder right, or to the right for shoulder left, up and down are exchanged;
+- wrist unflipped, if h_5' (h_4 x h_6) > 0, and otherwise wrist flipped.
 
 For the inverse chain (the first three axes meet, or axes 3, 4 and 5 are parallel) read 6, 5, ..., 1 for 1, 2,
 ..., 6 and exchange the words shoulder and wrist. If axes 1 and 2 are parallel, elbow and forearm take the
