@@ -284,3 +284,10 @@ def test_no_link_is_called_by_its_file() -> None:
     for page in DOCS.rglob("*.md"):
         found = re.findall(r"\[[^\]\n]*\.md[^\]\n]*\]\(", page.read_text(encoding="utf-8"))
         assert not found, (page.name, found)
+
+
+def test_no_page_has_marks_of_a_merge() -> None:
+    """One page once had both versions of a paragraph."""
+    for page in (DOCS.parent / "README.md", *DOCS.rglob("*.md")):
+        found = re.findall(r"^(?:<{7}|>{7}) ", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        assert not found, page.name
