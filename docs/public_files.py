@@ -92,7 +92,7 @@ On 28 November:
 
 All engines refuse two of the five refused files. One other file has no link, and one has an expression
 in place of a number. The fifth file disables an element by `<!mesh ...>`, and all engines load this
-file; dynx now reads it, too. The unexplained difference is an error of 4e-12 in PyBullet's forward
+file. dynx now reads it, too. The unexplained difference is an error of 4e-12 in PyBullet's forward
 dynamics. It is rounding, for a base of 0.1 g that carries 3 kg. dynx no longer reports it as a
 difference.
 
