@@ -32,17 +32,17 @@ class RobotInMillimetres(Rule):
     """DX520 robot-in-millimetres: The lengths of the robot are in millimetres, where URDF requires metres.
 
     The evidence is the distance of each joint that moves from the frame of its parent link, where it is not
-    zero. A robot is reported if there are two such joints or more, the median is 5 m or more, and the robot
-    has less than 1e-3 kg per cube of the sum of these distances (air has 1.2 kg per cubic metre). Without any
-    mass the median must be 20 m or more. In example-robot-data and pybullet_data the largest median is 1.2 m,
-    and the least mass per cube 0.017 kg/m^3.
+    zero. The rule reports a robot if there are two such joints or more and the median is 5 m or more. The
+    robot must also have less than 1e-3 kg per cube of the sum of these distances. Air has 1.2 kg per cubic
+    metre. Without any mass the median must be 20 m or more. In example-robot-data and pybullet_data the
+    largest median is 1.2 m, and the least mass per cube 0.017 kg/m^3.
 
-    A robot with a joint that moves and fewer distances, as many wheels, grippers and turntables have, is
-    judged by three kinds of length: that distance, the distances of centres of mass from their joints, and
-    the diagonals of the shapes of its bodies, meshes included. It is reported if it has two lengths or more,
-    each kind that it has is 5 m or more in the median, and the robot has less than 1e-5 kg per cube of the
-    sum of all. Without any mass the shapes must be 20 m or more. So a mesh alone that lacks its scale is not
-    reported here (DX517 does).
+    A robot with a moving joint may have fewer distances, such as a wheel, a gripper or a turntable. The rule
+    then uses three kinds of length: this distance, the distances of centres of mass from their joints, and
+    the diagonals of the shapes of its bodies, meshes included. It reports the robot if there are two lengths
+    or more, and each kind that exists is 5 m or more in the median. The robot must also have less than 1e-5
+    kg per cube of the sum of all lengths. Without any mass the shapes must be 20 m or more. So a mesh alone
+    that lacks its scale is not reported here (DX517 does).
 
     Usual causes: a program that exports the drawing's unit; a file written from a data sheet.
 

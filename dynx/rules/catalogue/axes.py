@@ -229,9 +229,8 @@ class AxisNearlyAligned(EditingRule):
     CAD programs export axes with noise, such as ``0 1 1.2e-12`` or ``1.6e-10 0 1``. Engines have faster
     joints for axes along x, y and z, and choose them by comparing the axis with a tolerance.
 
-    - Drake 1.51.1 takes the coordinate axis where a component of the unit axis rounds to more than 1 -
-      2.2e-16, that is, where the deviation is below about 1.8e-8 rad; for revolute, continuous and prismatic
-      joints.
+    - Drake 1.51.1 takes the coordinate axis if a component of the unit axis rounds to more than 1 - 2.2e-16.
+      The deviation is then below about 1.8e-8 rad. This applies to revolute, continuous and prismatic joints.
     - Pinocchio 4.1.0 takes it up to a deviation of 1e-12.
     - Both compare with the positive directions only: ``1.6e-10 0 -1`` is used as it stands.
     - PyBullet 3.2.7 and MuJoCo 4.0.0 use all numbers. So does dynx.

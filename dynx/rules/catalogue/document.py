@@ -92,8 +92,8 @@ class LineTooLong(EditingRule):
 
     Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 read lines of any length.
 
-    The effect depends on which byte is the 8191st, so it comes and goes with every edit of the file: a mass
-    off by its decimals, an offset that is zero, or nothing.
+    The effect depends on which byte is the 8191st, so it comes and goes with every edit of the file. It may
+    be a mass off by its decimals, an offset that is zero, or nothing.
 
     What to do: write one element per line. ``dynx doctor --fix`` breaks such lines in front of each element
     and changes nothing else.
@@ -350,9 +350,9 @@ class MisspelledWord(Rule):
     URDF readers ignore unknown names, mostly without a warning: with ``<intertial>`` the link has no mass,
     with ``<limit uper="1">`` the range ends at 0, with ``<dynamics dampng="1">`` there is no damping. The
     rule reports an unknown name that is close to a known name which is missing, or has its letters in another
-    order (``ryp``): of elements of ``<robot>``, ``<link>``, ``<joint>`` and ``<inertial>``, and of attributes
-    of elements that matter for dynamics. In an ``<origin>``, ``roll``, ``pitch`` and ``yaw`` stand for
-    ``rpy``, and ``x``, ``y`` and ``z`` for ``xyz``.
+    order (``ryp``). It examines elements of ``<robot>``, ``<link>``, ``<joint>`` and ``<inertial>``, and
+    attributes of elements that matter for dynamics. In an ``<origin>``, ``roll``, ``pitch`` and ``yaw`` stand
+    for ``rpy``, and ``x``, ``y`` and ``z`` for ``xyz``.
 
     Extensions (``<gazebo>``, ``<sensor>``, names with a prefix) are not close to any of them.
 
@@ -455,14 +455,14 @@ def _outermost_xacro(root: SourceElement) -> Iterator[SourceElement]:
 class MalformedXml(Rule):
     """DX532 malformed-xml: The text is not well-formed XML, which engines forgive and other programs do not.
 
-    All engines parse URDF by tinyxml2, which is lenient: ``--`` in a comment, ``&`` or ``<`` in a name,
-    attributes without white space between them, a blank behind ``<``, ``<!mesh ...>`` in place of a comment,
-    a malformed or second XML declaration, text in front of the robot and elements behind it. Pinocchio 4.1,
-    PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file without a warning, and read the same robot.
-    Python's XML parsers, xacro and the launch system of ROS refuse it.
+    All engines parse URDF by tinyxml2, which is lenient. It accepts ``--`` in a comment, ``&`` or ``<`` in a
+    name, attributes without white space between them, and a blank behind ``<``. It also accepts
+    ``<!mesh ...>`` in place of a comment, a malformed or second XML declaration, text in front of the robot
+    and elements behind it. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file without
+    a warning, and read the same robot. Python's XML parsers, xacro and the launch system of ROS refuse it.
 
-    dynx reads the file as the engines do, with a note; faults that tinyxml2 refuses too (an attribute that
-    occurs twice or has no quotes, an element that does not end) it refuses with their line.
+    dynx reads the file as the engines do, with a note. Some faults tinyxml2 refuses, too: an attribute that
+    occurs twice or has no quotes, an element that does not end. dynx refuses these faults with their line.
 
     What to do: correct the fault. No remedy of ``dynx doctor`` is needed: each file that it writes is
     well-formed.

@@ -72,8 +72,8 @@ class InertiaFromShapes(CallingRule):
     - With the flag ``URDF_USE_INERTIA_FROM_FILE`` PyBullet reads the tensor, as Pinocchio, MuJoCo and Drake
       do.
 
-    On 64 of 65 robots of example-robot-data that PyBullet loads and that have joints, inverse dynamics moves
-    by more than 1e-6 of the largest torque, in the median by 0.8 %; on UR5 by up to 2.8 N m.
+    PyBullet loads 65 robots of example-robot-data that have joints. On 64 of them inverse dynamics changes by
+    more than 1e-6 of the largest torque, in the median by 0.8 %. On UR5 it changes by up to 2.8 N m.
 
     What to do: write ``p.loadURDF(path, useFixedBase=True, flags=p.URDF_USE_INERTIA_FROM_FILE)``.
 
@@ -159,11 +159,11 @@ class MujocoSettings(EditingRule):
     the robot.
 
     MuJoCo reads an element ``<mujoco>`` in a URDF, which authors add for the folder of the meshes. Other
-    attributes of its ``<compiler>`` change the robot: ``boundmass`` and ``boundinertia`` raise small masses
+    attributes of its ``<compiler>`` change the robot. ``boundmass`` and ``boundinertia`` raise small masses
     and moments, ``settotalmass`` scales all masses, ``balanceinertia`` and ``inertiafromgeom`` replace
-    tensors, and ``autolimits="false"`` makes MuJoCo refuse the limits of a URDF. In ``<option>`` the
-    attributes ``density``, ``viscosity`` and ``wind`` add the drag of a fluid, and ``<flag>`` switches
-    gravity or constraints off.
+    tensors. ``autolimits="false"`` makes MuJoCo refuse the limits of a URDF. In ``<option>`` the attributes
+    ``density``, ``viscosity`` and ``wind`` add the drag of a fluid, and ``<flag>`` switches gravity or
+    constraints off.
 
     - MuJoCo 4.0 obeys them.
     - Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 ignore ``<mujoco>``. So does dynx.

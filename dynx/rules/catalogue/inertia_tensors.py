@@ -50,7 +50,7 @@ class InertiaBrokenByRounding(Rule):
     rounding decides what engines do.
 
     The principal moments of a rigid body are never negative, and none exceeds the sum of the other two. For
-    thin plates and rods, and for point masses seen from the joint, the two sides are equal; then the last
+    thin plates and rods, and for point masses seen from the joint, the two sides are equal. Then the last
     binary digit decides, and engines round differently. A moment of 0.3 next to 0.1 and 0.2 is fine, while
     0.13 next to 0.1 and 0.03 is 3e-17 too much.
 
@@ -66,9 +66,9 @@ class InertiaBrokenByRounding(Rule):
 
     What to do: the body is correct. Raise the moments by less than anyone can measure.
 
-    ``dynx doctor --fix`` adds the same amount, 16 units in the last place of the largest moment about the
-    link's origin, to all three moments; a point mass on a fixed joint is merged with the link that carries it
-    instead. The equations of motion change by a few 1e-15 of their size.
+    ``dynx doctor --fix`` adds the same amount to all three moments: 16 units in the last place of the largest
+    moment about the link's origin. It merges a point mass on a fixed joint with the link that carries it. The
+    equations of motion change by a few 1e-15 of their size.
     """
 
     engines = measured_on("pybullet", "mujoco")
@@ -133,9 +133,9 @@ class InertiaOfNoBody(ImpossibleInertia):
 
     ``dynx doctor --fix`` first tries the links rigidly connected to this one: often their sum is a possible
     body, and then the inertias are merged, which changes no equation of motion. Otherwise the nearest tensor
-    that a body can have replaces it, and the report says that the physics changed. Choose otherwise with
-    ``--choose DX103=nearest`` (never merge) or ``--choose DX103=keep``: the numbers stay, and the report
-    prints the lines that give them to PyBullet and Drake after loading; MuJoCo cannot use these numbers.
+    that a body can have replaces it, and the report says that the physics changed. ``--choose DX103=nearest``
+    never merges links. With ``--choose DX103=keep`` the numbers stay, and the report prints the lines that
+    give them to PyBullet and Drake after loading. MuJoCo cannot use these numbers.
     """
 
     fault = "triangle"
@@ -146,9 +146,9 @@ class NegativePrincipalMoment(ImpossibleInertia):
     have.
 
     A moment of inertia is a sum of masses times squared distances and cannot be negative. A tensor with a
-    negative principal moment mostly comes from the parallel axis theorem applied in the wrong direction or
-    twice, or from products of inertia too large for the moments (a misplaced decimal point, mixed units, a
-    swapped pair of numbers). The diagonal may look correct.
+    negative principal moment mostly comes from one of two mistakes. The parallel axis theorem was applied in
+    the wrong direction or twice. Or the products of inertia are too large for the moments (a misplaced
+    decimal point, mixed units, a swapped pair of numbers). The diagonal may look correct.
 
     - PyBullet 3.2.7 prints "Bad inertia tensor properties" and replaces the whole tensor by ZERO.
     - MuJoCo 4.0.0 refuses the file ("inertia must have positive eigenvalues"), for links that cannot move
@@ -179,9 +179,9 @@ class InertiaNotDiagonal(Rule):
     """DX105 inertia-not-diagonal: PyBullet diagonalises a tensor with products of inertia only to a
     millionth.
 
-    Bullet stores principal moments only. Where ``ixy``, ``ixz`` or ``iyz`` is not zero, its loader
-    diagonalises the tensor by Jacobi's method and stops as soon as the products of inertia are below a
-    millionth of the trace, after one more rotation. The remaining products are dropped.
+    Bullet stores principal moments only. If ``ixy``, ``ixz`` or ``iyz`` is not zero, its loader diagonalises
+    the tensor by Jacobi's method. It stops as soon as the products of inertia are below a millionth of the
+    trace, after one more rotation. The remaining products are dropped.
 
     - PyBullet 3.2.7: its tensor is off by 1e-14 to 1e-9 of its size, and by up to 2e-6 where principal
       moments are nearly equal.
@@ -194,9 +194,9 @@ class InertiaNotDiagonal(Rule):
     What to do: nothing if a millionth is good enough. To make engines agree to rounding, give the principal
     moments and rotate the inertial frame instead.
 
-    ``dynx doctor --fix`` does that: the moments about the principal axes, no products of inertia, and the
-    axes in the ``rpy`` of the inertial's origin, each with as many digits as a double has, calculated in
-    extended precision. It is the same tensor. MuJoCo up to 3.13 ignored that ``rpy`` (DX112).
+    ``dynx doctor --fix`` does that: it writes the moments about the principal axes, no products of inertia,
+    and the axes in the ``rpy`` of the inertial's origin. It calculates them in extended precision, and writes
+    as many digits as a double has. It is the same tensor. MuJoCo up to 3.13 ignored that ``rpy`` (DX112).
     """
 
     engines = measured_on("pybullet")
@@ -289,10 +289,11 @@ class InertiaTooSmall(Rule):
     Some engines compare moments of inertia with fixed small numbers, whatever the size of the robot.
 
     - MuJoCo 4.0.0 refuses a file ("inertia must have positive eigenvalues") in which a principal moment is
-      below 1e-14 kg m^2, unless the whole tensor is zero: a thin rod with a moment of 0 about its axis, or
-      tensors that are zero except for residues such as -1e-20. It refuses a point mass on a joint ("mass and
-      inertia of moving bodies must be larger than mjMINVAL"), and where it merges rigidly connected links,
-      any partial sum that is a point or a rod. For links that cannot move it checks the tensor all the same.
+      below 1e-14 kg m^2, unless the whole tensor is zero. Examples are a thin rod with a moment of 0 about
+      its axis, and tensors that are zero except for residues such as -1e-20. It refuses a point mass on a
+      joint ("mass and inertia of moving bodies must be larger than mjMINVAL"). When it merges rigidly
+      connected links, it refuses any partial sum that is a point or a rod. For links that cannot move it
+      checks the tensor all the same.
     - PyBullet 3.2.7 replaces residues with a negative moment by zero, which has no effect. Its simulation
       does not move a joint that carries an inertia about its axis below 2.2e-16 kg m^2.
     - Pinocchio 4.1.0 and Drake 1.51.1 use the numbers unchanged.
@@ -303,7 +304,7 @@ class InertiaTooSmall(Rule):
     robot of micrometres change the unit of length or mass.
 
     ``dynx doctor --fix`` merges such a link with the links rigidly connected to it, which is the same rigid
-    body; where that is not enough the moments are raised to 1.5e-14 kg m^2. The report says that the physics
+    body. If that is not enough, it raises the moments to 1.5e-14 kg m^2. The report says that the physics
     changed where that is more than rounding of the robot's largest inertia. Nothing is done where it would be
     more than a thousandth of that.
     """
@@ -421,8 +422,8 @@ class InertialRotationIgnored(Rule):
 
     The ``<origin>`` of an ``<inertial>`` may rotate the axes in which the tensor is given.
 
-    - MuJoCo 3.3.7, 3.12 and 3.13 read the tensor and dropped the rotation: the tensor is used as if it were
-      given in the axes of the link (issue 3559 of its repository). MuJoCo 4.0.0 is right.
+    - MuJoCo 3.3.7, 3.12 and 3.13 read the tensor and drop the rotation. They use the tensor as if it were
+      given in the axes of the link (issue 3559 of MuJoCo's repository). MuJoCo 4.0.0 is right.
     - Pinocchio 4.1.0, PyBullet 3.2.7, Drake 1.51.1 are right.
 
     The effect: as large as the difference between the principal moments, up to a factor of ten in the mass
@@ -584,11 +585,11 @@ class InertiaRoundedUnsymmetrically(Rule):
 
     Before the first call of ``calculateInverseDynamics``, ``calculateMassMatrix`` or ``calculateJacobian``,
     PyBullet 3.2.7 moves the tensor of each link to the link's origin, and checks that it is symmetric. It
-    computes two opposite entries as ``(m x) y`` and ``(m y) x``, which are rounded differently, and compares
-    them with a fixed bound of 1.1e-15 kg m^2 (five units in the last place of 1), whatever the size of the
-    link. A link can fail once two coordinates of its centre of mass, along the principal axes, and its mass
-    have a product above 2 kg m^2. Of links with a centre of mass within half a metre, a quarter failed at 100
-    kg, and four of five at 100 t.
+    computes two opposite entries as ``(m x) y`` and ``(m y) x``, which are rounded differently. It compares
+    their difference with a fixed bound of 1.1e-15 kg m^2 (five units in the last place of 1), whatever the
+    size of the link. A link can fail once two coordinates of its centre of mass, along the principal axes,
+    and its mass have a product above 2 kg m^2. Of links with a centre of mass within half a metre, a quarter
+    failed at 100 kg, and four of five at 100 t.
 
     - PyBullet 3.2.7 prints "invalid inertia tensor for body 3 I(2,0)!=I(0,2)", and all three calls raise an
       exception for the robot from then on. Links that cannot move are checked too, but never the root. Poses

@@ -140,8 +140,8 @@ class MimicAsConstraint(CallingRule):
 
     - Pinocchio 4.1 and PyBullet 3.2.7 load the joint as free and ignore the tag. Pinocchio has
       ``buildModelFromUrdf(..., mimic=True)``, with which the joint has no coordinate.
-    - MuJoCo 4.0 makes a soft equality constraint of it: the joint has a coordinate, and where the constraint
-      is violated ``mj_inverse`` adds the restoring force, which can be a hundred times the torque.
+    - MuJoCo 4.0 makes a soft equality constraint of it, and the joint has a coordinate. Where the constraint
+      is violated, ``mj_inverse`` adds the restoring force, which can be a hundred times the torque.
     - Drake 1.51 makes a constraint of it that discrete-time simulation keeps; its inverse dynamics ignores
       it, and continuous-time forward dynamics refuses to run.
 
@@ -287,9 +287,9 @@ class ContactsAsForces(CallingRule):
     shapes are larger than the links, push each other apart in a simulation.
 
     - MuJoCo 4.0: ``mj_inverse`` finds the contacts of the configuration and adds their forces to the torque.
-      Contacts between a link and its parent are left out, those of other pairs are not. Where shapes overlap
-      by design, the error of the torque is unbounded; the report calls such forces present, and names the
-      links that touch at states within limits in which mimic joints follow.
+      Contacts between a link and its parent are left out, those of other pairs are not. If shapes overlap by
+      design, the error of the torque is unbounded. The report calls such forces present. It names the links
+      that touch at states within limits in which mimic joints follow.
     - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) have no contacts; PyBullet
       simulates contacts of a robot with itself only with a flag. Drake 1.51 has them where a scene graph is
       connected, and not in inverse dynamics.

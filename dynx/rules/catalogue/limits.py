@@ -229,8 +229,8 @@ class UpperLimitMissing(EditingRule):
     rarely intended.
 
     - PyBullet 3.2.7 reads a missing ``upper`` as -1. The range is -2 to -1, and a joint between -1 and 0 is
-      beyond it: in ``stepSimulation`` it can move towards -1 but not away from it, as at a stop.
-      ``calculateInverseDynamics`` has no limits.
+      outside this range. In ``stepSimulation`` the joint can move towards -1 but not away from it, as at a
+      stop. ``calculateInverseDynamics`` has no limits.
     - Pinocchio 4.1 has the range -2 to 0. So has dynx, with a note.
     - Drake 1.51 has a lower limit of -2 and no upper one; MuJoCo 4.0 ignores a limit with one end.
 
@@ -416,12 +416,12 @@ class ZeroOutsideLimits(Rule):
     """DX510 zero-outside-limits: Zero lies outside the range of a joint, and nearly every tool starts there.
 
     Nearly every tool starts at zero: PyBullet after loadURDF, RViz, MuJoCo's ``qpos0``,
-    ``pinocchio.neutral``, Drake's default context. Where zero is outside the range of a joint, a simulation
-    begins with a force that pushes the joint back, planners call the start state invalid, and a check of
+    ``pinocchio.neutral``, Drake's default context. If zero is outside the range of a joint, a simulation
+    begins with a force that pushes the joint back. Planners call the start state invalid, and a check of
     self-collision at "home" checks a pose that the robot cannot reach.
 
-    It is legal and sometimes wanted (an elbow that cannot be stretched), so it is reported and not corrected:
-    another zero would change the numbers in every program that uses the robot.
+    Such a range is legal and sometimes wanted (an elbow that cannot be stretched), so the doctor reports it
+    and does not correct it. Another zero would change the numbers in every program that uses the robot.
     """
 
     kind = "practice"

@@ -48,8 +48,8 @@ class TextureNotFound(EditingRule):
 
     - Drake 1.51 looks for the image when it parses the file, with or without a scene graph, and refuses the
       whole file where it is missing ("which does not exist"). It finds a path relative to the description and
-      a ``file://`` path; a ``package://`` path only where the program added the package to the parser
-      (``parser.package_map().Add(name, folder)``), which its documented call does not do.
+      a ``file://`` path. It finds a ``package://`` path only if the program added the package to the parser
+      (``parser.package_map().Add(name, folder)``), which the documented call does not do.
     - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 do not look for it.
     - The texture of a material inside ``<visual>`` matters in Drake only with a scene graph (DX516).
 
@@ -84,10 +84,11 @@ class MaterialWithoutColour(EditingRule):
     form.
 
     A ``<material>`` directly in the robot defines a colour for its ``<visual>`` elements. Dynamics does not
-    depend on it; whether the file loads does:
+    depend on it. But some engines refuse the file:
 
-    - Drake 1.51 refuses the file for a material without name ("missing a required name"), without colour and
-      texture ("has no color or texture information"), or whose ``rgba`` is not four numbers.
+    - Drake 1.51 refuses the file for a material without name ("missing a required name"), and for one without
+      colour and texture ("has no color or texture information"). It also refuses an ``rgba`` that is not four
+      numbers.
     - MuJoCo 4.0 refuses the file for a ``<color>`` whose ``rgba`` is missing or not four numbers, in
       ``<visual>`` too; it needs neither colour nor name.
     - Pinocchio 4.1 and PyBullet 3.2.7 accept all of these.

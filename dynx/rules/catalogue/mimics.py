@@ -146,7 +146,7 @@ class MimicChain(EditingRule):
     for each follower, which its solver satisfies only approximately.
 
     What to do: let each follower name the first joint of its chain, with the product of the multipliers and
-    the offsets carried along: value = m2 (m1 x + b1) + b2 = (m2 m1) x + (m2 b1 + b2). It is the same robot.
+    the combined offset. The value is m2 (m1 x + b1) + b2 = (m2 m1) x + (m2 b1 + b2). It is the same robot.
     ``dynx doctor --fix`` does so with ``--choose DX511=direct``, and by default leaves the chain.
     """
 
@@ -186,9 +186,9 @@ class MimicBeyondLimits(Rule):
     The leader has a range, multiplier and offset map it to a range of the follower, and the follower's own
     ``<limit>`` is smaller. One of the four numbers is wrong.
 
-    An engine that keeps the limits and the coupling as constraints (MuJoCo, Drake in discrete time) stops the
-    leader short of its own limit, where the two constraints oppose each other; one that only computes
-    dynamics has no stop. The equations of motion are the same with all.
+    Some engines keep the limits and the coupling as constraints (MuJoCo, Drake in discrete time). They stop
+    the leader short of its own limit, where the two constraints oppose each other. An engine that only
+    computes dynamics has no stop. The equations of motion are the same with all.
 
     The file does not say which of the numbers is wrong, so no edit removes the cause.
     """

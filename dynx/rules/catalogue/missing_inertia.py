@@ -67,8 +67,8 @@ class LinkWithoutInertial(Rule):
       no mass.
 
     The effect is large: torques, mass matrices and accelerations are off by 10 % to many times their size
-    wherever such a link moves. With a floating base, the root counts too; with a fixed base, the root and the
-    links rigidly connected to it cannot move, so their mass has no effect, and they are not listed.
+    wherever such a link moves. With a floating base, the root counts, too. With a fixed base, the root and
+    the links rigidly connected to it cannot move. Their mass has no effect, so the report does not list them.
 
     What to do: write the mass and the inertia of the link. If it is only a frame, write zeros explicitly.
 
@@ -121,19 +121,19 @@ class MasslessRoot(Rule):
 
     - PyBullet 3.2.7 reads mass 0 as "fixed to the world", also with ``useFixedBase=False``: the robot hangs
       in the air, and its base has no coordinates.
-    - MuJoCo 4.0.0 merges links rigidly connected to the root into it and is not affected; without such links
-      it refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL").
+    - MuJoCo 4.0.0 merges links rigidly connected to the root into the root, so it is not affected. Without
+      such links it refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL").
     - Pinocchio 4.1.0 and Drake 1.51.1 are not affected.
 
     The effect: in PyBullet there is no floating robot at all.
 
     What to do: give the root the mass of the body that it represents.
 
-    ``dynx doctor --fix`` merges the heaviest link that is rigidly connected to the root (directly or by a
-    chain of fixed joints) into it; that link gets a zero inertial and keeps its name and its place. It is the
-    same rigid body. Where no link rigidly connected to the root has mass, the root gets 2e-15 kg and 1.5e-14
-    kg m^2, which all engines accept and which is too little to show in any result; ``--choose DX107=keep``
-    leaves it. A robot without any mass has no inertial data (DX118).
+    ``dynx doctor --fix`` merges one link into the root: the heaviest link that is rigidly connected to the
+    root, directly or by a chain of fixed joints. This link gets a zero inertial and keeps its name and its
+    place. It is the same rigid body. If no link rigidly connected to the root has mass, the root gets 2e-15
+    kg and 1.5e-14 kg m^2. All engines accept these numbers, which are too small to show in any result.
+    ``--choose DX107=keep`` leaves the root unchanged. A robot without any mass has no inertial data (DX118).
     """
 
     engines = measured_on("pybullet")
@@ -337,8 +337,8 @@ class NoInertialData(Rule):
 
     - Pinocchio 4.1.0 and Drake 1.51.1 load it with a mass matrix of zero; the one then gives NaN for
       accelerations, and the other an error.
-    - PyBullet 3.2.7 gives 1 kg and 1 kg m^2 about every axis to each link without ``<inertial>``, and fixes a
-      floating robot to the world if its root has an ``<inertial>`` of zero.
+    - PyBullet 3.2.7 gives 1 kg and 1 kg m^2 about every axis to each link without ``<inertial>``. It fixes a
+      floating robot to the world if the root has an ``<inertial>`` of zero.
     - MuJoCo 4.0.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL"), unless
       collision shapes other than meshes give the links a mass.
 
@@ -348,9 +348,9 @@ class NoInertialData(Rule):
     What to do: enter the masses and inertias, from the data sheet or the CAD model.
 
     ``dynx doctor --fix`` invents no inertia, and the file is not called alike. ``--choose DX118=least`` gives
-    every moving body 2e-15 kg and 1.5e-14 kg m^2, with which all engines load the file; do not simulate the
-    result, in which a torque of 1e-6 N m turns a joint at millions of rad/s. A single moving part without
-    mass is DX110 or DX113.
+    every moving body 2e-15 kg and 1.5e-14 kg m^2, with which all engines load the file. Do not simulate the
+    result: a torque of 1e-6 N m then turns a joint at millions of rad/s. A single moving part without mass is
+    DX110 or DX113.
     """
 
     engines = measured_on("pybullet", "mujoco")
@@ -485,9 +485,9 @@ class IncompleteInertial(EditingRule):
 
     What to do: complete it. A number under a misspelled name, ``<mass valeu="1.5"/>`` or ``ixxx="0.02"``, is
     what was meant; ``dynx doctor --fix`` corrects the name. Otherwise it can only guess, and the report says
-    so: a number between the tags, ``<mass>2.5</mass>``, is the mass; a tensor without mass is dropped, so
-    that the link weighs nothing; a mass without tensor stays as a point mass at the origin of the inertial,
-    as in Pinocchio and Drake. ``--choose DX410=weightless`` drops that mass too.
+    so. A number between the tags, ``<mass>2.5</mass>``, is the mass. A tensor without mass is dropped, so the
+    link weighs nothing. A mass without tensor stays as a point mass at the origin of the inertial, as in
+    Pinocchio and Drake. ``--choose DX410=weightless`` drops that mass too.
     """
 
     stage = "reading"

@@ -49,8 +49,8 @@ class InertiaByDefaultClass(EditingRule):
     ``<default class="part"><geom mass="2"/></default>`` gives a mass to each ``<geom class="part"/>``.
 
     - MuJoCo 4.0 applies classes to all attributes, and a class has what the classes around it have.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) applies the density and the size of a class, and neither its
-      mass, nor its type, place or orientation: the body weighs what the density of water gives.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) applies the density and the size of a class, but not its mass,
+      type, place or orientation. The mass of the body then follows from the density of water.
     - Drake 1.51 loses what a class has from the class around it where a class between them has no ``<geom>``.
     - PyBullet 3.2.7 (``loadMJCF``) applies little of a class.
 

@@ -33,8 +33,8 @@ class LinkNamedWorld(Rule):
       robot to it. PyBullet 3.2.7 gives the link no mass if it has no ``<inertial>``, and then fixes it to the
       world (any other name would weigh 1 kg). MuJoCo 4.0.0 mistakes it for its world body, which cannot have
       a free joint.
-    - On a link that is not the root: Drake refuses the file ("form one or more loops"), and MuJoCo drops the
-      mass and the tensor of that link without a warning.
+    - On a link that is not the root, Drake refuses the file ("form one or more loops"). MuJoCo drops the mass
+      and the tensor of that link without a warning.
     - Pinocchio 4.1.0 gives the name no meaning.
 
     The effect: a robot that cannot move its base, or (MuJoCo) a mass matrix without that link.
@@ -183,16 +183,16 @@ class RobotWithoutName(EditingRule):
 class PercentInName(EditingRule):
     """DX414 percent-in-name: A name has a % in it, which PyBullet uses as a printf format.
 
-    PyBullet 3.2.7 puts names into the messages it prints, and uses some of them as the format of ``printf``:
-    ``%p`` prints memory contents, ``%s`` and ``%n`` read or write it and can end the process. Whether that
-    happens depends on which message is printed (one about a link without ``<inertial>``, say), so a file can
-    load for years and crash one day. dynx does not give such a file to PyBullet.
+    PyBullet 3.2.7 puts names into the messages it prints, and uses some of them as the format of ``printf``.
+    ``%p`` prints memory contents. ``%s`` reads memory and ``%n`` writes memory, which can end the process.
+    Whether that happens depends on which message is printed (one about a link without ``<inertial>``, say),
+    so a file can load for years and crash one day. dynx does not give such a file to PyBullet.
 
     Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 are not affected.
 
     What to do: use letters, digits and ``_`` in names. ``dynx doctor --fix`` writes ``_`` for ``%`` in the
-    name and wherever the document mentions it (ends of joints, mimic joints, Gazebo references); programs
-    that look links or joints up by the old name must be changed with it.
+    name and wherever the document mentions it (ends of joints, mimic joints, Gazebo references). Change
+    programs that look up links or joints by the old name.
     """
 
     stage = "reading"
@@ -228,8 +228,8 @@ class NameWithBlanks(EditingRule):
     """DX533 name-with-blanks: A name is blank, or begins or ends with a blank.
 
     ``<link name=" "/>`` or ``<joint name="elbow ">``: nobody sees the blank, and it is part of the name. A
-    program that looks up ``elbow`` does not find the joint, and a joint whose parent is ``base`` does not
-    find the link ``base `` (every engine refuses that file, and so does dynx, which names the similar link).
+    program that looks up ``elbow`` does not find the joint. A joint whose parent is ``base`` does not find
+    the link ``base ``. Every engine refuses that file, and so does dynx, which names the similar link.
 
     Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file and keep the blanks, and so does
     dynx.

@@ -26,9 +26,9 @@ class DecimalComma(MisspelledNumberRule):
 
     Each engine reads it differently:
 
-    - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` the whole inertial is
-      dropped, so the link weighs nothing; with such an ``<inertia>`` only the tensor is dropped, so the link
-      is a point mass. A line on stderr says so. In a ``<joint>`` the file is refused.
+    - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` it drops the whole inertial,
+      so the link weighs nothing. With such an ``<inertia>`` it drops only the tensor, so the link is a point
+      mass. A line on stderr says so. In a ``<joint>`` the file is refused.
     - PyBullet 3.2.7 reads up to the comma: ``2,5`` is 2, ``0,03`` is 0. It prints no warning. In a vector it
       does so with each of the three numbers.
     - MuJoCo 4.0 refuses the file and names the line.
@@ -93,9 +93,9 @@ class TextAfterNumber(MisspelledNumberRule):
 
     A second point, a unit, a Fortran exponent (``1.5d-3``), a hexadecimal number.
 
-    - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` the whole inertial is
-      dropped, so the link weighs nothing; with such an ``<inertia>`` only the tensor is dropped, so the link
-      is a point mass. A line on stderr says so. In a ``<joint>`` the file is refused.
+    - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` it drops the whole inertial,
+      so the link weighs nothing. With such an ``<inertia>`` it drops only the tensor, so the link is a point
+      mass. A line on stderr says so. In a ``<joint>`` the file is refused.
     - PyBullet 3.2.7 reads the number at the beginning and ignores the rest, without a warning. ``1.5d-3`` is
       then 1.5, a thousand times too large.
     - MuJoCo 4.0 refuses the file and names the line, but reads hexadecimal numbers.
@@ -298,10 +298,10 @@ class AttributeWithoutNumber(MisspelledNumberRule):
     empty ``xyz`` or ``rpy`` is DX408, an infinite limit DX407. Expressions of xacro, ``${mass}``, are not
     corrected: the file has to be expanded.
 
-    What to do: write the numbers. The file does not contain them, so ``dynx doctor --fix`` leaves them as
-    they are and lists each with its line; it removes only an empty attribute that has a default, and one that
-    no engine needs. ``--choose DX420=guess`` writes 0 for a mass, an entry of a tensor and a word of a
-    vector, and removes any other attribute, so that its default holds.
+    What to do: write the numbers. The file does not contain the missing numbers, so ``dynx doctor --fix``
+    leaves the attributes as they are and lists each with its line. It removes only empty attributes that have
+    a default or that no engine needs. ``--choose DX420=guess`` writes 0 for a mass, an entry of a tensor and
+    a word of a vector, and removes any other attribute, so that its default holds.
     """
 
     advice = "Write the numbers, or remove the attribute."

@@ -34,8 +34,8 @@ class OrientationAsQuaternion(EditingRule):
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore the attribute without a warning: the origin has no
       rotation.
 
-    The effect is that of a missing rotation: of order 1 in the positions of all links behind a joint, and in
-    the mass matrix where the quaternion is in an ``<inertial>``.
+    The rotation is missing. The effect is of order 1 in the positions of all links behind a joint, and in the
+    mass matrix if the quaternion is in an ``<inertial>``.
 
     What to do: write the orientation as ``rpy``, with all digits. ``dynx doctor --fix`` does so, from the
     quaternion scaled to length 1; the orientation is the same to rounding. In a file that states no such
@@ -113,9 +113,9 @@ class AngleInDegrees(Rule):
     """DX513 angle-in-degrees: An angle seems to be written in degrees, where URDF reads radians.
 
     Two patterns are reported. An ``rpy`` angle beyond a full turn, 6.28 rad: no orientation is written so,
-    while 10, 45, 90 and 180 are usual in degrees. And the limits of a revolute joint that are both whole
-    multiples of 5 between -360 and 360, at least one of them 30 or more: 30 rad are five turns, and 30
-    degrees is a usual range. Limits of -100 and 100 are not reported, because they often stand for
+    while 10, 45, 90 and 180 are usual in degrees. The rule also reports limits of a revolute joint that are
+    both whole multiples of 5 between -360 and 360, at least one of them 30 or more. 30 rad are five turns,
+    and 30 degrees is a usual range. Limits of -100 and 100 are not reported, because they often stand for
     "unlimited".
 
     All engines read radians: 90 is 14.3 turns. They agree, but on a robot with wrong poses or joints without
@@ -176,11 +176,11 @@ def _radians(angle_deg: float) -> str:
 class AngleCutShort(EditingRule):
     """DX514 angle-cut-short: An angle is a multiple of pi/4 with only two or three decimals, such as 1.57.
 
-    ``1.57`` is 0.0008 rad short of pi/2 and ``3.14`` 0.0016 rad short of pi: at the end of a one metre arm
+    ``1.57`` is 0.0008 rad short of pi/2 and ``3.14`` 0.0016 rad short of pi. At the end of a one metre arm
     the error is 0.8 and 1.6 mm, more than the repeatability of the robot. Axes that are parallel in the CAD
-    model are not parallel in the file, so closed-form inverse kinematics (IKFast, the formulas for a
-    spherical wrist) finds no solution or a wrong one. Reported are angles in the ``<origin>`` of a joint that
-    are a multiple of pi/4, up to a full turn, rounded or cut to two or three decimals.
+    model are not parallel in the file. So closed-form inverse kinematics (IKFast, the formulas for a
+    spherical wrist) finds no solution, or a wrong solution. Reported are angles in the ``<origin>`` of a
+    joint that are a multiple of pi/4, up to a full turn, rounded or cut to two or three decimals.
 
     All engines read the number unchanged.
 

@@ -32,21 +32,22 @@ class InertiaBeyondGeometry(Rule):
     can have.
 
     A body of mass m that reaches at most R from an axis has a moment of inertia about that axis of at most m
-    R^2, reached only if all mass is at the farthest point; real parts have a third of that or less. The rule
-    uses the principal axes of the tensor through the centre of mass, the reach of all shapes of the link and
-    of links rigidly connected to it, and reports moments that no distribution of the mass can have. Shapes
-    are enlarged, never reduced: a mesh counts as its convex hull.
+    R^2. It has this moment only if all mass is at the distance R. Real parts have a third of it or less. The
+    rule uses the principal axes of the tensor through the centre of mass, and the reach of all shapes of the
+    link and of links rigidly connected to it. It reports moments that no distribution of the mass can have.
+    Shapes are enlarged, never reduced: a mesh counts as its convex hull.
 
-    A second bound holds along a line. Where the hull reaches from -a to b along a direction, as seen from the
-    centre of mass, the mean square of the mass's distance in it is at most a b (Bhatia and Davis 2000). It
-    follows from the tensor, as half the sum of the moments less the moment about that direction. Thirteen
-    directions of the link's axes and diagonals and the three principal ones are examined, for a hull widened
-    by a hundredth of its diagonal, and root mean squares a tenth beyond the bound are reported: shapes are
-    often drawn without the motor inside. This finds a plate whose tensor is that of a block, and a centre of
-    mass at the end of a link whose mass is spread over all of it.
+    A second bound holds along a line. Let the hull reach from -a to b along a direction, as seen from the
+    centre of mass. The mean square of the mass's distance in this direction is then at most a b (Bhatia and
+    Davis 2000). It follows from the tensor, as half the sum of the moments less the moment about that
+    direction. The rule examines thirteen directions of the link's axes and diagonals, and the three principal
+    directions. It widens the hull by a hundredth of its diagonal, and reports root mean squares a tenth
+    beyond the bound, because shapes are often drawn without the motor inside. This finds a plate whose tensor
+    is that of a block, and a centre of mass at the end of a link whose mass is spread over all of it.
 
-    Usual causes: the tensor is in kg mm^2 or g mm^2 where URDF requires kg m^2; it was taken about the link
-    frame, not the centre of mass; the mesh is scaled by 0.001 and the tensor is not; a placeholder.
+    Usual causes: the tensor is in kg mm^2 or g mm^2 where URDF requires kg m^2, or it was taken about the
+    link frame, not the centre of mass. Or the mesh is scaled by 0.001 and the tensor is not, or the tensor is
+    a placeholder.
 
     All engines use the numbers unchanged, so they agree with each other, but not with the real robot: torques
     are too large, and controllers tuned on them too stiff.
@@ -140,8 +141,8 @@ class InertiaBelowGeometry(Rule):
     A uniform body has a radius of gyration k = sqrt(I / m) of a fifth to a half of its size (a rod l/3.5, a
     ball d/3.2). Where even the largest k is below a hundredth of the diagonal of the link's own shape, the
     mass would have to be concentrated in a speck. Usual causes: the tensor is in kg m^2 times 1e-6 or 1e-9
-    (wrong units in the CAD program), it was written with too few digits (``1e-06`` everywhere), or it was set
-    to zero because an importer required the element.
+    (wrong units in the CAD program), or it was written with too few digits (``1e-06`` everywhere). Or it was
+    set to zero because an importer required the element.
 
     All engines that load such a tensor use it. Torques come out too small, forward dynamics is badly
     conditioned, and simulators with a fixed step may oscillate or diverge at such joints.
@@ -174,13 +175,13 @@ class CenterOfMassOutsideGeometry(Rule):
     shape.
 
     Mass cannot be negative, so the centre of mass of a body lies within its convex hull, and so within its
-    bounding box. The rule uses the box, along the axes of the link frame, of all shapes of the link and of
-    links rigidly connected to it, widened by a hundredth of its diagonal for shapes that are slightly too
-    small.
+    bounding box. The rule uses the bounding box, along the axes of the link frame, of all shapes of the link
+    and of links rigidly connected to it. It widens the box by a hundredth of the diagonal, because shapes may
+    be slightly too small.
 
-    Usual causes: the ``<origin>`` of ``<inertial>`` is in millimetres; it is given in the frame of the CAD
-    assembly or of the parent, not of the link; it was mirrored for the other side and lost a sign; the mesh
-    was moved by the ``<origin>`` of ``<visual>`` and the inertial was not.
+    Usual causes: the ``<origin>`` of ``<inertial>`` is in millimetres, or it is given in the frame of the CAD
+    assembly or of the parent, not of the link. Or it was mirrored for the other side and lost a sign. Or the
+    mesh was moved by the ``<origin>`` of ``<visual>`` and the inertial was not.
 
     All engines use the numbers unchanged: gravity torques are equally wrong in all of them.
 
@@ -213,13 +214,13 @@ class PlaceholderInertia(Rule):
     """DX504 placeholder-inertia: The inertia is a placeholder: the unit matrix, or one tensor for links of
     different mass.
 
-    Two patterns are reported. A tensor that is exactly the unit matrix: 1 kg m^2 about every axis is the
-    inertia of a steel ball of 0.15 m radius and 111 kg, and not of a usual link. And one tensor with three
-    equal moments (0.001 in many tutorials) that at least three links share although their masses differ: the
-    inertias of real links would differ too.
+    Two patterns are reported. The tensor is exactly the unit matrix. 1 kg m^2 about every axis is the inertia
+    of a steel ball of 0.15 m radius and 111 kg, not of a usual link. And one tensor with three equal moments
+    (0.001 in many tutorials) that at least three links share although their masses differ: the inertias of
+    real links would differ too.
 
-    All engines use the numbers unchanged. With an identity tensor on a link of a few hundred grams the
-    inertia of the whole arm is that of the placeholder: torques and gains tuned on them are useless.
+    All engines use the numbers unchanged. If a link of a few hundred grams has an identity tensor, the
+    placeholder dominates the inertia of the whole arm. Torques, and gains tuned with them, are then useless.
 
     The file does not contain the true tensor, so no edit removes the cause. Inertias from the shapes, with
     mass spread evenly, are a better guess than any placeholder.
@@ -269,8 +270,8 @@ class MassRatioExtreme(Rule):
     in double precision carries 16 digits; where a joint connects bodies a million apart, six of them are lost
     to the difference of scale. The worst case is a light body that carries a heavy one.
 
-    Affected are simulators that solve joints as constraints between free bodies (ODE in Gazebo, contacts in
-    Bullet and MuJoCo), which converge slowly or not at all while joints drift apart and oscillate. Forward
+    This affects simulators that solve joints as constraints between free bodies (ODE in Gazebo, contacts in
+    Bullet and MuJoCo). They converge slowly or not at all, while joints drift apart and oscillate. Forward
     dynamics loses digits with every engine, since the condition number of the mass matrix is of the order of
     the ratio. Inverse dynamics is not affected, and engines agree on it.
 
@@ -315,12 +316,13 @@ class DensityImplausible(Rule):
     thin plate is not reported for its drawn thickness. The largest single shape, a mesh as its convex hull,
     is no larger than the shapes together: less than 1 kg/m^3 in it are reported (air has 1.2).
 
-    Of 1,122 such bodies in example-robot-data the median is 500 kg/m^3, 98 in 100 lie between 20 and 21,400,
-    the least is 2.5 (a drone with an arm), and only the finger knuckles of one hand are beyond a bound: 50 g
-    in cubes of 2 mm.
+    Of 1,122 such bodies in example-robot-data the median is 500 kg/m^3, and 98 in 100 lie between 20 and
+    21,400. The least is 2.5 (a drone with an arm). Only the finger knuckles of one hand are beyond a bound:
+    50 g in cubes of 2 mm.
 
-    Usual causes: a mass in grams or tonnes; a shape in millimetres without ``scale="0.001 0.001 0.001"``; a
-    tiny placeholder for the shape; a mass that an exporter computed from a mesh in the wrong unit.
+    Usual causes: a mass in grams or tonnes, or a shape in millimetres without ``scale="0.001 0.001 0.001"``.
+    Or a tiny placeholder stands for the shape, or an exporter computed the mass from a mesh in the wrong
+    unit.
 
     All engines use the numbers unchanged. A heavy finger dominates every torque of the arm that carries it.
 
@@ -392,14 +394,14 @@ _LEAST_SHARE, _LEAST_ROBOT = 0.02, 1e-3
 class MassBeyondSize(Rule):
     """DX519 mass-beyond-size: A body without shapes is far too heavy for the distances between its joints.
 
-    Where no shape tells the size of a body (no shapes, or meshes that are missing), the distances from its
-    frame to its centres of mass and to the joints that it carries do, or those of its neighbours if they are
-    larger; a fiftieth of the sum of such distances in the whole robot is the least that counts. Reported are
-    bodies of more than 1e7 kg per cube of that length. In example-robot-data no body has more than 2e4 (an
-    ankle of 0.6 kg between joints 3 cm apart): 500 times less.
+    If a body has no shapes, or if meshes are missing, the rule takes the distances from its frame to its
+    centres of mass and to the joints that it carries. If the distances of its neighbours are larger, it takes
+    those. The least size is a fiftieth of the sum of such distances in the whole robot. Reported are bodies
+    of more than 1e7 kg per cube of that length. In example-robot-data no body has more than 2e4 (an ankle of
+    0.6 kg between joints 3 cm apart): 500 times less.
 
-    Usual causes: a mass in grams; a tensor or a mass that an exporter computed from a mesh in millimetres,
-    which makes a finger of 56 g one of 56 tonnes; an extra digit.
+    Usual causes: a mass in grams, an extra digit, or a tensor or a mass that an exporter computed from a mesh
+    in millimetres. In the last case, a finger of 56 g gets 56 tonnes.
 
     All engines use the numbers unchanged. Torques of all joints before such a body are those of that body
     alone, and inverse dynamics of one engine may refuse it (DX119). Bodies with shapes are in DX517.

@@ -33,7 +33,8 @@ class UnknownCollisionShape(EditingRule):
     - Pinocchio 4.1 drops the shape with a line on stderr; Drake 1.51 warns about it or ignores it.
     - PyBullet 3.2.7 reads it.
 
-    The dynamics of a link that states its inertia does not depend on shapes; whether the file loads does.
+    The dynamics of a link that states its inertia does not depend on shapes. But some engines refuse the
+    file.
 
     What to do: write the shape as a box or a mesh where you need it in other engines. ``dynx doctor --fix``
     removes the ``<collision>``. ``--choose DX417=keep`` keeps it, and MuJoCo refuses the file.
@@ -68,8 +69,8 @@ class ShapeWithoutGeometry(EditingRule):
     - MuJoCo 4.0 refuses it for a collision ("geometry specification not found") and ignores the visual.
     - Pinocchio 4.1 drops the shape with a line on stderr. Drake 1.51 warns about it or ignores it.
 
-    The dynamics of a link that states its inertia does not depend on shapes; whether the file loads does. The
-    shapes ``<plane>`` and ``<cdf>``, which PyBullet alone reads, are DX417.
+    The dynamics of a link that states its inertia does not depend on shapes. But some engines refuse the
+    file. The shapes ``<plane>`` and ``<cdf>``, which PyBullet alone reads, are DX417.
 
     What to do: remove the element, or give it a geometry. ``dynx doctor --fix`` removes it.
     ``--choose DX424=keep`` keeps it, and engines refuse the file.
@@ -115,8 +116,8 @@ class CollisionShapeWithoutSize(EditingRule):
     Exporters and templates write ``<box size="0 0 0"/>``, ``<sphere radius="0"/>`` or ``<mesh filename=""/>``
     for a link that has no shape, and a plate gets a thickness of zero.
 
-    - MuJoCo 4.0 refuses the file for any size that is not positive, of a box, sphere, cylinder or capsule
-      ("size 0 must be positive in geom"), and for a missing attribute ("required attribute missing"). Every
+    - MuJoCo 4.0 refuses the file if a size of a box, sphere, cylinder or capsule is not positive ("size 0
+      must be positive in geom"). It also refuses a missing attribute ("required attribute missing"). Every
       positive size will do, however small.
     - PyBullet 3.2.7 reads sizes of zero and below; it refuses the file ("Cannot load URDF file") where the
       attribute is missing.
@@ -125,12 +126,13 @@ class CollisionShapeWithoutSize(EditingRule):
       too, raises ``SystemExit``, which ends the program; it accepts a sphere of radius zero.
     - Pinocchio 4.1 reads no shapes into a model.
 
-    The dynamics of a link that states its inertia does not depend on shapes; whether the file loads does.
+    The dynamics of a link that states its inertia does not depend on shapes. But some engines refuse the
+    file.
 
     What to do: remove the shape, or give it its size. ``dynx doctor --fix`` removes the sign of a negative
     size, and the ``<collision>`` where a size is zero or missing. ``--choose DX425=thicken`` writes 1e-6 m
-    for each size of zero instead, which keeps the contacts of a plate (a shape of which a size or the file is
-    missing is removed all the same); ``--choose DX425=keep`` keeps the file, and MuJoCo refuses it.
+    for each size of zero instead, which keeps the contacts of a plate. It still removes a shape of which a
+    size or the file is missing. ``--choose DX425=keep`` keeps the file, and MuJoCo refuses it.
     """
 
     stage = "reading"
@@ -194,12 +196,13 @@ def _sizes_in(shape: SourceElement, name: str) -> tuple[float, ...] | None:
 class VisualIncomplete(EditingRule):
     """DX428 visual-incomplete: A visual lacks a size, a mesh file, or the name or colour of its material.
 
-    Dynamics does not depend on visuals; whether the file loads does. Engines read the first shape and the
-    first material of each.
+    Dynamics does not depend on visuals. But some engines refuse the file. Engines read the first shape and
+    the first material of each.
 
     - PyBullet 3.2.7 refuses the file ("Cannot load URDF file") for a ``<box>`` without ``size``, a
-      ``<sphere>`` without ``radius``, a ``<cylinder>`` or ``<capsule>`` without ``radius`` or ``length``, a
-      ``<mesh>`` without ``filename`` or with an empty one, and a ``<material>`` without ``name``.
+      ``<sphere>`` without ``radius``, and a ``<cylinder>`` or ``<capsule>`` without ``radius`` or ``length``.
+      It also refuses a ``<mesh>`` without ``filename`` or with an empty one, and a ``<material>`` without
+      ``name``.
     - MuJoCo 4.0 refuses it for a ``<color>`` whose ``rgba`` is missing or not four numbers ("attribute 'rgba'
       does not have enough data"), and for a ``<material>`` with neither name nor colour.
     - Pinocchio 4.1 and Drake 1.51 load the robot: they read no visuals into a model without geometry.
@@ -243,20 +246,20 @@ class MeshNotFound(Rule):
     """DX516 mesh-not-found: The file of a mesh, or of the texture of a visual, is not where the description
     says.
 
-    Reported are files whose location is certain: a path relative to the description, a ``file://`` path, or a
-    file in a package that was found (in the folders above the description, in ROS_PACKAGE_PATH or
-    AMENT_PREFIX_PATH) but does not contain it. On a case-sensitive file system ``Base.STL`` is not
-    ``base.stl``. Paths that leave the package or repository of the description are not looked at.
+    The rule reports files whose location is certain: a path relative to the description, a ``file://`` path,
+    or a file that is missing in a package that was found. dynx looks for packages in the folders above the
+    description, in ROS_PACKAGE_PATH and in AMENT_PREFIX_PATH. On a case-sensitive file system ``Base.STL`` is
+    not ``base.stl``. Paths that leave the package or repository of the description are not looked at.
 
     PyBullet 3.2.7 refuses the whole file ("Cannot load URDF file") for a mesh in ``<visual>`` or in
-    ``<collision>``, and so does Drake 1.51 with a scene graph; MuJoCo 4.0 does for ``<collision>`` alone,
-    since it discards what is only visual. A texture in ``<visual>`` is missed by Drake with a scene graph
+    ``<collision>``, and so does Drake 1.51 with a scene graph. MuJoCo 4.0 refuses it for ``<collision>``
+    alone, because it discards visual shapes. A texture in ``<visual>`` is missed by Drake with a scene graph
     alone; one in a material of the robot is DX426. Pinocchio's ``buildModelFromUrdf`` reads no mesh, its
     ``buildGeomFromUrdf`` raises. PyBullet takes every path, ``/meshes/a.stl`` too, as relative to the folder
-    of the description and to each folder above it, and searches folders of its own
-    (``setAdditionalSearchPath``), so it may find meshes that others do not; the message says which file it
-    finds in the package or repository. Dynamics does not depend on shapes, and dynx reads the file without
-    them.
+    of the description and to each folder above it. It also searches folders of its own
+    (``setAdditionalSearchPath``), so it may find meshes that other engines do not find. The message says
+    which file it finds in the package or repository. Dynamics does not depend on shapes, and dynx reads the
+    file without them.
 
     The description does not say which file was meant, so no edit removes the cause; the message gives the
     nearest name.

@@ -26,8 +26,8 @@ class JointOfSeveralFreedoms(EditingRule):
       quaternions, and refuses the usual limits on it. No engine reads ``ball``.
     - ``planar``: Pinocchio has (x, y, cos, sin), MuJoCo and Drake three joints or coordinates; PyBullet moves
       it but cannot do dynamics.
-    - ``floating`` in the middle of a tree: Pinocchio has a quaternion; PyBullet makes the joint FIXED and
-      prints one line on stdout; MuJoCo and Drake refuse it or leave the link free in the world.
+    - ``floating`` in the middle of a tree: Pinocchio has a quaternion. PyBullet makes the joint FIXED and
+      prints one line on stdout. MuJoCo and Drake refuse it or leave the link free in the world.
 
     dynx has no such joint and refuses the file.
 
@@ -78,8 +78,8 @@ class FloatingJointAtRoot(EditingRule):
     dynx reads the joint as fixed and leaves the decision to ``base=``.
 
     What to do: specify the base in one place. ``dynx doctor --fix`` makes the joint fixed. Engines that read
-    a floating base from the file then fix the robot to the world unless the call says otherwise, so that this
-    counts as a change of the physics (``--level physics``).
+    a floating base from the file then fix the robot to the world, unless the call says otherwise. So the
+    change counts as a change of the physics (``--level physics``).
     """
 
     # Before the rules about inertia, which may give the empty root a body.
@@ -181,7 +181,7 @@ class LoopJoint(EditingRule):
     """DX220 loop-joint: A ``<loop_joint>`` closes a kinematic loop, which URDF cannot express.
 
     ``<loop_joint>`` is an extension of a few programs, such as Isaac Sim and the predecessor of Drake's
-    ``MultibodyPlant``: it names two links (``<link1>``, ``<link2>``) that are held together although a robot
+    ``MultibodyPlant``. It names two links (``<link1>``, ``<link2>``) that are held together, although a robot
     in URDF is a tree.
 
     - Drake 1.51 refuses the file: "loop joints are not supported in MultibodyPlant".

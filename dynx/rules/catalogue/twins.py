@@ -65,40 +65,40 @@ class TwinsDiffer(Rule):
     principal moments and the distance of the centre of mass from the joint. Reported are masses or moments
     that differ by more than 10 %, and distances that differ by more than 10 % and 5 mm.
 
-    Where the joints are not equally far, links are twins if their joints rotate, their parents are one link
-    or twins by name, and masses (to 1 %), moments and centres of mass are alike. Reported are distances of
-    the joints that differ by more than 1 % and 1 mm. (The zero of a sliding joint may be anywhere along it.)
-    They are not reported where several twins lie about one plane, and the origin of their parent's frame, but
-    not its centre of mass, is beside it.
+    If the joints are not equally far, links are twins under three conditions. Their joints rotate, their
+    parents are one link or twins by name, and masses (to 1 %), moments and centres of mass are alike.
+    Reported are distances of the joints that differ by more than 1 % and 1 mm. (The zero of a sliding joint
+    may be anywhere along it.) They are not reported where several twins lie about one plane, and the origin
+    of their parent's frame, but not its centre of mass, is beside it.
 
     Limits of effort and velocity, and widths of ranges, are reported if they differ by more than 1 %, and
     widths by more than 0.01 rad or m. A joint that mimics another is left out: it moves as that one does.
 
     Numbers with a sign are compared with every joint at zero, in the axes of the root, after a reflection at
-    the plane between the twins. This needs twins that lie so: places and axes of their joints, and of their
-    children's joints, are reflections (to 1 mm and 1 %), and together with the centre of mass they show how a
-    link is turned about its joint. Otherwise these numbers are not compared.
+    the plane between the twins. This requires that places and axes of their joints, and of their children's
+    joints, are reflections (to 1 mm and 1 %). Together with the centre of mass they must show how a link is
+    turned about its joint. Otherwise these numbers are not compared.
 
     - The products of inertia are reported if they differ by more than 5 % of the largest moment. A part may
-      also be the same on both sides, or be turned by half a turn: the products may have the signs of any
+      also be the same on both sides, or be turned by half a turn. So the products may have the signs of any
       reflection or half turn along these axes that agrees with the centres of mass. Where the products are
       reflections, and the centres of mass none that agrees, the centres are reported.
     - The range of a joint is reported if its ends differ by more than 1 % and 0.01 rad or m. The axes decide
-      what is expected. Where the reflected posture has equal positions, as in a hip that pitches about y on
-      both sides, that is the same range; where it has opposite ones, as in a hip that rolls about x, it is
-      the range from minus the upper end to minus the lower one.
+      what is expected. If the reflected posture has equal positions, as in a hip that pitches about y on both
+      sides, the ranges must be equal. If it has opposite positions, as in a hip that rolls about x, the range
+      goes from minus the upper end to minus the lower end.
 
     Of 69 files of example-robot-data 15 are reported. In six the moments of forearms or arms differ or are
     exchanged, and in two those of one leg are zero. In four the limits of effort or velocity differ, such as
     150 N m on the left and 1000 on the right. In four the products of an upper arm were copied with their
     signs. In two the roll of both ankles has the range of a pitch. Of more than 1,000 files of pybullet_data
-    nine are: a bracket's centre of mass is at 2 cm on the left and at 3 cm on the right; the upper legs of
-    five Laikagos are 2 mm further from the hips on the left, and motors of two minitaurs 2 and 26 mm further
-    from the body on one side; a biped has copied products, and an effort of 0 on one side.
+    nine are. A bracket's centre of mass is at 2 cm on the left and at 3 cm on the right. The upper legs of
+    five Laikagos are 2 mm further from the hips on the left. Motors of two minitaurs are 2 and 26 mm further
+    from the body on one side. A biped has copied products, and an effort of 0 on one side.
 
-    Usual causes: one side was measured or exported again and the other was not; an extra digit; moments in
-    another unit; one of several signs of products of inertia was lost in reflecting the file; limits were
-    copied without exchanging their ends.
+    Usual causes: one side was measured or exported again and the other was not, a number has an extra digit,
+    or moments are in another unit. Or one of several signs of products of inertia was lost when the file was
+    reflected, or limits were copied without exchanging their ends.
 
     All engines use the numbers unchanged. The robot leans to one side, and a gait that was tuned on one leg
     fails on the other. Where the parts differ (a tool in one hand), nothing is wrong.
