@@ -22,8 +22,8 @@ HEAD = """<!-- Written by docs/write_rules.py from the classes in dynx/rules/cat
 This page lists all causes that `dynx doctor` detects. There are two kinds. A *difference* makes engines
 return different numbers, or makes an engine refuse the file. A *practice* is bad practice or concerns one
 engine, without a measurable difference. Each rule states the engine versions in which the behaviour was
-measured; a test checks them against the installed engines. Each rule has a small robot in `models/traps` that
-shows its cause.
+measured. A test checks these versions against the installed engines. Each rule has a small robot in
+`models/traps` that shows its cause.
 """
 
 GROUPS = {

@@ -81,7 +81,7 @@ class AxisWithoutDirection(EditingRule):
     """DX202 axis-without-direction: The axis of a joint that moves is zero or empty.
 
     ``<axis xyz="0 0 0"/>`` and ``<axis/>`` define no direction of motion. Exporters write the first for fixed
-    joints, where it is ignored; once the type is changed to ``revolute`` it matters. A joint without any
+    joints, where it is ignored. Once the type is changed to ``revolute`` it matters. A joint without any
     ``<axis>`` is fine: URDF's default (1, 0, 0) is used by all engines alike. A direction in an attribute
     that is not ``xyz`` is DX218.
 
@@ -238,7 +238,7 @@ class AxisNearlyAligned(EditingRule):
     The effect is the angle: poses, and with them torques, are off by up to twice that angle at every joint.
 
     What to do: write the coordinate axis, which is meant. ``dynx doctor --fix`` writes it, and the report
-    says that the physics changed, by less than 2e-8; ``--choose DX226=keep`` leaves the axis.
+    says that the physics changed, by less than 2e-8. ``--choose DX226=keep`` leaves the axis.
     """
 
     engines = measured_on("pinocchio", "drake")

@@ -169,7 +169,7 @@ class UnknownUrdfVersion(EditingRule):
     - Pinocchio 4.1 refuses a version that is not of the form x.y or not between 1.0 and 1.2.
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore it.
 
-    What to do: remove the attribute, or write ``version="1.0"``. ``dynx doctor --fix`` removes it; without it
+    What to do: remove the attribute, or write ``version="1.0"``. ``dynx doctor --fix`` removes it. Without it
     a file counts as version 1.0. Where an origin has a quaternion, which URDF has from version 1.1 on, and
     the version is a later one, it writes ``version="1.2"`` instead.
     """
@@ -249,7 +249,7 @@ class ProcessingInstruction(EditingRule):
       declarations precedes it.
     - dynx reads the file without the instruction, as XML defines it.
 
-    What to do: remove the instruction. ``dynx doctor --fix`` does so; no engine reads anything in it.
+    What to do: remove the instruction. ``dynx doctor --fix`` does so. No engine reads anything in it.
     """
 
     stage = "reading"
@@ -407,7 +407,7 @@ class LeftOverXacro(EditingRule):
     """DX531 left-over-xacro: The file has xacro elements, which every engine skips with all that they hold.
 
     ``<xacro:property>``, ``<xacro:include>`` or the call of a macro is left in a file that was expanded by
-    hand or renamed from ``.xacro`` to ``.urdf``. The program ``xacro`` evaluates such elements; readers of
+    hand or renamed from ``.xacro`` to ``.urdf``. The program ``xacro`` evaluates such elements. Readers of
     URDF do not know them. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load the rest without a
     warning, and so does dynx, with a note. They agree, but links, joints and inertias that a macro would
     write are not in the robot.

@@ -66,7 +66,7 @@ class InertiaFromShapes(CallingRule):
     - The cuboid is about the centre of mass of the file, wherever the shapes are. Several shapes give one
       box, round ones their bounding box, a mesh the box about its vertices in its own frame, turned with it.
       Margins of 1 to 3 mm are added on each side.
-    - A link without collision shapes has the inertia of a cuboid of 2 mm, almost zero; one without
+    - A link without collision shapes has the inertia of a cuboid of 2 mm, almost zero. A link without
       ``<inertial>`` has mass 1 and the inertia of its shapes. A text STL counts as no shape.
     - A link of mass zero has no inertia.
     - With the flag ``URDF_USE_INERTIA_FROM_FILE`` PyBullet reads the tensor, as Pinocchio, MuJoCo and Drake
@@ -78,7 +78,7 @@ class InertiaFromShapes(CallingRule):
     What to do: write ``p.loadURDF(path, useFixedBase=True, flags=p.URDF_USE_INERTIA_FROM_FILE)``.
 
     The file is correct, and no file mends the call. ``dynx doctor`` examines the plain call beside the
-    engines, as ``pybullet:plain``; its difference counts only where ``--engine`` names it.
+    engines, as ``pybullet:plain``. Its difference counts only where ``--engine`` names it.
     """
 
     advice = "Write flags=p.URDF_USE_INERTIA_FROM_FILE in the call of loadURDF."

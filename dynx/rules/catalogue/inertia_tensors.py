@@ -60,7 +60,7 @@ class InertiaBrokenByRounding(Rule):
       then fail.
     - MuJoCo 4.0.0 refuses the file ("inertia must satisfy A + B >= C"), in about two of five cases where the
       rpy of the inertial rotates a plate.
-    - Pinocchio 4.1.0 does not look; Drake 1.51.1 has a tolerance of 1e-14.
+    - Pinocchio 4.1.0 does not look. Drake 1.51.1 has a tolerance of 1e-14.
 
     The effect: where PyBullet drops the tensor, its mass matrix is off by 1e-6 to 0.9 of its size.
 
@@ -188,7 +188,7 @@ class InertiaNotDiagonal(Rule):
     - Pinocchio 4.1.0, MuJoCo 4.0.0 and Drake 1.51.1 are right to rounding.
 
     The effect: mass matrix and inverse dynamics are off by 1e-13 to 1e-9 of their size, accelerations by up
-    to 1e-8. No simulation shows that; a comparison of two engines to rounding does, and smaller differences
+    to 1e-8. No simulation shows that. A comparison of two engines to rounding does, and smaller differences
     are hidden behind it. 46 of 69 public robots have this difference.
 
     What to do: nothing if a millionth is good enough. To make engines agree to rounding, give the principal
@@ -480,8 +480,8 @@ class TinyInertialOffset(Rule):
       unless the file has ``<mujoco><compiler fusestatic="false"/></mujoco>``.
     - Pinocchio 4.1.0, PyBullet 3.2.7 and Drake 1.51.1 use all numbers.
 
-    The effect: gravity torques of a balanced link vanish. A centre of mass at 7e-7 m was 2.3e-2 of the
-    torques of a robot whose links are balanced; beside heavy links it is 1e-7 of them and less. A rotation
+    The effect: gravity torques of a balanced link vanish. If the links of a robot are balanced, a centre of
+    mass at 7e-7 m was 2.3e-2 of the torques. Beside heavy links it is 1e-7 of the torques or less. A rotation
     changes the mass matrix by 1e-6 of the difference between the moments.
 
     What to do: usually the offset is noise of a CAD program, and zero is meant. If the numbers are meant,
@@ -490,7 +490,7 @@ class TinyInertialOffset(Rule):
     ``<inertial>`` avoids them, because MuJoCo orders the axes itself.
 
     dynx prints that line and proves it. ``--choose DX117=zero`` writes zero into the file instead, for all
-    engines; the report then says that the physics changed. Without a moving joint, on the floating base, the
+    engines. The report then says that the physics changed. Without a moving joint, on the floating base, the
     line does not help, and zero is written.
     """
 

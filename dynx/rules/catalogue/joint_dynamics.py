@@ -48,8 +48,8 @@ class DampingInInverseDynamics(CallingRule):
 
     What to do: decide which convention you want, and add ``damping * v`` to Pinocchio's torque or switch
     damping off in the others. The file is correct, so ``dynx doctor --fix`` does not change it. dynx returns
-    the rigid-body torque unless called with ``joint_dynamics=True``; doctor compares the rigid-body torque
-    and prints the calls that switch damping off in each engine.
+    the rigid-body torque unless called with ``joint_dynamics=True``. The doctor compares the rigid-body
+    torque and prints the calls that switch damping off in each engine.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf", "sdf")
@@ -83,8 +83,8 @@ class FrictionInInverseDynamics(CallingRule):
     The effect is the friction itself, a few per cent of the torque for a geared arm.
 
     What to do: decide which convention you want. The file is correct, so ``dynx doctor --fix`` does not
-    change it. dynx returns the rigid-body torque unless called with ``joint_dynamics=True``; doctor compares
-    the rigid-body torque and prints the call that switches friction off in MuJoCo.
+    change it. dynx returns the rigid-body torque unless called with ``joint_dynamics=True``. The doctor
+    compares the rigid-body torque and prints the call that switches friction off in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")
@@ -110,7 +110,7 @@ class NegativeDamping(EditingRule):
     - MuJoCo 4.0 and PyBullet 3.2.7 simulate a joint that accelerates itself.
     - Pinocchio 4.1 stores the number and does not use it.
 
-    Nothing in the rigid-body dynamics depends on it; with ``joint_dynamics=True`` dynx uses the number
+    Nothing in the rigid-body dynamics depends on it. With ``joint_dynamics=True`` dynx uses the number
     unchanged, with a note.
 
     What to do: correct the sign. ``dynx doctor --fix`` removes it. ``--choose DX303=zero`` writes 0 instead.
@@ -142,10 +142,10 @@ class MimicAsConstraint(CallingRule):
       ``buildModelFromUrdf(..., mimic=True)``, with which the joint has no coordinate.
     - MuJoCo 4.0 makes a soft equality constraint of it, and the joint has a coordinate. Where the constraint
       is violated, ``mj_inverse`` adds the restoring force, which can be a hundred times the torque.
-    - Drake 1.51 makes a constraint of it that discrete-time simulation keeps; its inverse dynamics ignores
+    - Drake 1.51 makes a constraint of it that discrete-time simulation keeps. Its inverse dynamics ignores
       it, and continuous-time forward dynamics refuses to run.
 
-    None of these is wrong; they are different robots. dynx gives a mimic joint no coordinate, and its torque
+    None of these is wrong. They are different robots. dynx gives a mimic joint no coordinate, and its torque
     goes to the joint it follows, in every backend.
 
     What to do: know which interpretation you use. doctor compares all engines with every joint free, where
@@ -180,7 +180,7 @@ class EmptyDynamics(EditingRule):
     """DX305 empty-dynamics: A dynamics element has neither damping nor friction.
 
     ``<dynamics/>``, or one that holds only an extension such as ``armature="0.01"``. URDF makes both
-    attributes optional and defines their defaults; it does not require one of them.
+    attributes optional and defines their defaults. It does not require one of them.
 
     - Pinocchio 4.1 and PyBullet 3.2.7 refuse the file: "joint dynamics element specified with no damping and
       no friction". They do so for every type of joint, fixed ones included.
@@ -216,7 +216,7 @@ class LimitsAsForces(CallingRule):
     - MuJoCo 4.0: a joint beyond its limit is pushed back by a constraint force, and ``mj_inverse`` adds that
       force to the torque. Forces of a hundred times the torque were measured. MuJoCo ignores equal limits,
       with a warning.
-    - PyBullet 3.2.7: ``stepSimulation`` pushes the joint back to the limit, equal ones included;
+    - PyBullet 3.2.7: ``stepSimulation`` pushes the joint back to the limit, equal ones included.
       ``calculateInverseDynamics`` ignores limits. PyBullet ignores a limit of ``lower="0"`` without ``upper``
       (see DX216 for other limits without ``upper``).
 
@@ -224,7 +224,7 @@ class LimitsAsForces(CallingRule):
     position, because the equations of motion have no limits.
 
     What to do: write the range of the joint, or ``type="fixed"`` (see DX508). The file does not say which, so
-    ``dynx doctor --fix`` does not change it; doctor prints the calls that switch limits off.
+    ``dynx doctor --fix`` does not change it. The doctor prints the calls that switch limits off.
     """
 
     advice = "Write the range of the joint, or switch its limits off."
@@ -260,7 +260,8 @@ class RotorInertia(CallingRule):
 
     What to do: decide whether the rotors belong to your robot. Pinocchio has ``model.armature`` for them,
     MuJoCo ``dof_armature``, dynx ``<dynamics armature="...">``. The file is correct, so ``dynx doctor --fix``
-    does not change it; doctor compares without rotors and prints the call that switches them off in Drake.
+    does not change it. The doctor compares without rotors and prints the call that switches them off in
+    Drake.
     """
 
     advice = "Decide whether rotors belong to the robot, and configure each engine accordingly."
@@ -290,12 +291,12 @@ class ContactsAsForces(CallingRule):
       Contacts between a link and its parent are left out, those of other pairs are not. If shapes overlap by
       design, the error of the torque is unbounded. The report calls such forces present. It names the links
       that touch at states within limits in which mimic joints follow.
-    - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) have no contacts; PyBullet
+    - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) have no contacts. PyBullet
       simulates contacts of a robot with itself only with a flag. Drake 1.51 has them where a scene graph is
       connected, and not in inverse dynamics.
 
     What to do: know whether your torques include contacts. The file is correct, so ``dynx doctor --fix`` does
-    not change it; doctor compares without contacts and prints the call that switches them off in MuJoCo.
+    not change it. The doctor compares without contacts and prints the call that switches them off in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")

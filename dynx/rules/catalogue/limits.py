@@ -27,7 +27,7 @@ _ZERO_LIMIT = f'<limit lower="0" upper="0" effort="{LARGEST}" velocity="{LARGEST
 class JointWithoutLimit(EditingRule):
     """DX203 joint-without-limit: A revolute or prismatic joint has no limit.
 
-    URDF requires a ``<limit>``; the type of a joint that can rotate without limit is ``continuous``.
+    URDF requires a ``<limit>``. The type of a joint that can rotate without limit is ``continuous``.
 
     - Pinocchio 4.1 and PyBullet 3.2.7 refuse the file.
     - MuJoCo 4.0 and Drake 1.51 read a joint without limits.
@@ -38,7 +38,7 @@ class JointWithoutLimit(EditingRule):
     corrects it. Otherwise the file does not contain them, so ``dynx doctor --fix`` leaves the joint
     unlimited: a revolute joint becomes ``continuous``, a prismatic one gets the largest double for its
     limits. ``--choose DX203=zero`` writes ``lower="0" upper="0"`` instead, the numbers that URDF has for a
-    ``<limit>`` in which they are not given; the joint then must not move in simulations that keep to limits.
+    ``<limit>`` in which they are not given. The joint then must not move in simulations that keep to limits.
     """
 
     stage = "reading"
@@ -82,7 +82,7 @@ class LimitWithoutEffortOrVelocity(EditingRule):
     URDF requires both up to version 1.1, although neither enters any equation of motion.
 
     - Pinocchio 4.1 refuses the file: "limit has no effort". It does so for every type of joint, fixed ones
-      included; not where the robot states ``version="1.2"``, see DX222.
+      included. If the robot states ``version="1.2"``, it does not (see DX222).
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file. So does dynx: what is not given is unlimited.
 
     Files with such limits are common, because only urdfdom, the reader of Pinocchio and ROS, checks them.
@@ -151,7 +151,7 @@ class LowerLimitAboveUpper(EditingRule):
 class NegativeEffortOrVelocity(EditingRule):
     """DX206 negative-effort-or-velocity: The largest effort or speed of a joint is negative.
 
-    Other formats use ``-1`` for "no limit"; otherwise the sign is a mistake.
+    Other formats use ``-1`` for "no limit". Otherwise the sign is a mistake.
 
     - Pinocchio 4.1 refuses the file: "Some components of min_effort are greater than max_effort".
     - Drake 1.51 refuses a negative velocity with a failed condition in its C++ sources. It ignores a negative
@@ -193,11 +193,11 @@ class NegativeEffortOrVelocity(EditingRule):
 class SafetyControllerWithoutGain(EditingRule):
     """DX207 safety-controller-without-gain: A safety controller has no k_velocity.
 
-    The element belongs to the PR2's controllers and to ROS; no engine simulates it. URDF requires its
-    attribute ``k_velocity``; the others are optional.
+    The element belongs to the PR2's controllers and to ROS. No engine simulates it. URDF requires its
+    attribute ``k_velocity``. The others are optional.
 
     - Pinocchio 4.1 refuses the file: "joint safety: no k_velocity".
-    - PyBullet 3.2.7 and MuJoCo 4.0 ignore it; Drake 1.51 warns that it ignores it.
+    - PyBullet 3.2.7 and MuJoCo 4.0 ignore it. Drake 1.51 warns that it ignores it.
 
     What to do: remove the element unless one of your programs reads it, or complete it. ``dynx doctor --fix``
     adds ``k_velocity="0"``, with which the described controller has no effect. A number
@@ -232,7 +232,7 @@ class UpperLimitMissing(EditingRule):
       outside this range. In ``stepSimulation`` the joint can move towards -1 but not away from it, as at a
       stop. ``calculateInverseDynamics`` has no limits.
     - Pinocchio 4.1 has the range -2 to 0. So has dynx, with a note.
-    - Drake 1.51 has a lower limit of -2 and no upper one; MuJoCo 4.0 ignores a limit with one end.
+    - Drake 1.51 has a lower limit of -2 and no upper one. MuJoCo 4.0 ignores a limit with one end.
 
     Only PyBullet's range affects a motion that the file allows. Where ``lower`` is above -1, it is above
     PyBullet's ``upper``, and PyBullet then ignores both, as it does where neither is given (DX508). A missing
@@ -243,7 +243,7 @@ class UpperLimitMissing(EditingRule):
 
     What to do: write the intended end. A number under a misspelled name, ``uper="1"``, is what was meant, and
     ``dynx doctor --fix`` corrects the name. Otherwise the file does not contain the end, and it writes
-    ``upper="0"``, as URDF, Pinocchio and dynx read it; the other three engines then have that range too.
+    ``upper="0"``, as URDF, Pinocchio and dynx read it. The other three engines then have that range too.
     """
 
     advice = "Write both ends of every range."
@@ -276,7 +276,7 @@ class LimitIncompleteInUrdf12(EditingRule):
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore the version. dynx reads a missing end as 0.
 
     What to do: write both ends. ``dynx doctor --fix`` writes 0 for the missing one, as earlier versions of
-    URDF define it; a number under a misspelled name, ``uper="1"``, is what was meant, and gets the right
+    URDF define it. A number under a misspelled name, ``uper="1"``, is what was meant, and gets the right
     name.
     """
 
@@ -304,9 +304,10 @@ class EffortLimitZero(Rule):
 
     Pinocchio and PyBullet store the zero, so torques that are clipped to it become zero. Gazebo and
     ros_control leave such a joint without force. MuJoCo reads 0 as "no limit" (no ``actfrcrange``), Drake as
-    "no actuator" where a transmission names the joint. Dynamics is the same with all; the limit is not.
+    "no actuator" where a transmission names the joint. The dynamics is the same on all engines, but the limit
+    is not.
 
-    For a passive joint (a wheel, a tendon's idler) zero is correct; a mimic joint, which needs no motor, is
+    For a passive joint (a wheel, a tendon's idler) zero is correct. A mimic joint, which needs no motor, is
     not reported. The file does not contain the true limit, so there is no remedy.
     """
 
@@ -384,13 +385,13 @@ class LimitsOnContinuousJoint(EditingRule):
     """DX509 limits-on-continuous-joint: A continuous joint has a lower or an upper limit, which has no
     meaning there.
 
-    ``type="continuous"`` means a joint that rotates without limit; its ``lower`` and ``upper`` have no
+    ``type="continuous"`` means a joint that rotates without limit. Its ``lower`` and ``upper`` have no
     meaning. Pinocchio and MuJoCo ignore them, PyBullet reports them in ``getJointInfo`` and does not apply
     them, and Drake 1.51 makes them the limits of the joint. The equations of motion are the same with all,
     but readers of the file assume the range.
 
     What to do: if the joint has a range, write ``type="revolute"`` and keep them. Else remove the two
-    attributes, so that the joint is unlimited in every engine; ``dynx doctor --fix`` does so with
+    attributes, so that the joint is unlimited in every engine. ``dynx doctor --fix`` does so with
     ``--choose DX509=drop``, and by default leaves them.
     """
 

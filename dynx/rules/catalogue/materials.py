@@ -17,7 +17,7 @@ class MaterialDefinedTwice(EditingRule):
     Materials are only colours, but a second definition decides whether the file loads:
 
     - Pinocchio 4.1 ("material is not unique") and Drake 1.51 ("was previously defined") refuse the file.
-    - PyBullet 3.2.7 warns; MuJoCo 4.0 does not check.
+    - PyBullet 3.2.7 warns. MuJoCo 4.0 does not check.
 
     This happens when the files of an arm and of a hand are combined.
 
@@ -90,7 +90,7 @@ class MaterialWithoutColour(EditingRule):
       colour and texture ("has no color or texture information"). It also refuses an ``rgba`` that is not four
       numbers.
     - MuJoCo 4.0 refuses the file for a ``<color>`` whose ``rgba`` is missing or not four numbers, in
-      ``<visual>`` too; it needs neither colour nor name.
+      ``<visual>`` too. It needs neither colour nor name.
     - Pinocchio 4.1 and PyBullet 3.2.7 accept all of these.
 
     What to do: write the name and the colour. ``dynx doctor --fix`` writes grey for a missing colour or one

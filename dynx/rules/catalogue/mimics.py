@@ -141,8 +141,8 @@ class MimicChain(EditingRule):
 
     ``<mimic>`` is meant to name a joint that moves by itself. Where it names a follower, dynx multiplies the
     factors along the chain, as the definition says, and so does joint_state_publisher. Pinocchio 4.1 refuses
-    such a file with ``mimic=True`` ("Mimicking and mimicked configuration spaces have different sizes");
-    without it, as by default, and in PyBullet all the joints are free. MuJoCo makes one equality constraint
+    such a file with ``mimic=True`` ("Mimicking and mimicked configuration spaces have different sizes").
+    Without it, as by default, and in PyBullet all the joints are free. MuJoCo makes one equality constraint
     for each follower, which its solver satisfies only approximately.
 
     What to do: let each follower name the first joint of its chain, with the product of the multipliers and

@@ -191,7 +191,7 @@ class MasslessLinkWithInertia(Rule):
     What to do: give the link its mass.
 
     ``dynx doctor --fix`` adds the tensor to that of a link with mass that is rigidly connected to it, its
-    parent first; the massless link gets a zero tensor. That is the same rigid body. Where there is no such
+    parent first. The massless link gets a zero tensor. That is the same rigid body. Where there is no such
     link, the link gets a mass of 2e-15 kg, which every engine accepts as mass and which is too little to show
     in any result. The tensor of a link that cannot move becomes zero.
     """
@@ -299,7 +299,7 @@ class MassMatrixSingular(Rule):
     What to do: enter the inertia. If the joint does not matter, make it fixed.
 
     ``dynx doctor --fix`` gives such links 2e-15 kg and 1.5e-14 kg m^2 about every axis, the least that all
-    engines accept; then all give the same accelerations, to rounding. The report says that the physics
+    engines accept. Then all give the same accelerations, to rounding. The report says that the physics
     changed: the inertia is invented, and the smallest torque accelerates it strongly. ``--choose DX113=keep``
     keeps the file.
     """
@@ -335,8 +335,8 @@ class NoInertialData(Rule):
     ``<inertial>`` at all, or zeros in all of them. Such a file states the kinematics of a robot and nothing
     about its dynamics:
 
-    - Pinocchio 4.1.0 and Drake 1.51.1 load it with a mass matrix of zero; the one then gives NaN for
-      accelerations, and the other an error.
+    - Pinocchio 4.1.0 and Drake 1.51.1 load it with a mass matrix of zero. Pinocchio then gives NaN for
+      accelerations, and Drake an error.
     - PyBullet 3.2.7 gives 1 kg and 1 kg m^2 about every axis to each link without ``<inertial>``. It fixes a
       floating robot to the world if the root has an ``<inertial>`` of zero.
     - MuJoCo 4.0.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL"), unless
@@ -437,8 +437,8 @@ _PRODUCTS = ("ixy", "ixz", "iyz")
 class MissingProductOfInertia(EditingRule):
     """DX409 missing-product-of-inertia: An inertia tensor is written without its zero products.
 
-    Tensors written by hand often omit the products of inertia that are zero. URDF requires all six numbers;
-    some engines accept fewer, some refuse the file.
+    Tensors written by hand often omit the products of inertia that are zero. URDF requires all six numbers.
+    Some engines accept fewer, some refuse the file.
 
     - Pinocchio 4.1 prints on stderr that ``ixy`` is missing and drops the whole tensor: the link is a point
       mass.
@@ -447,10 +447,10 @@ class MissingProductOfInertia(EditingRule):
 
     The effect is a link without moments of inertia in Pinocchio: of order 0.01 to 1 in the mass matrix.
 
-    What to do: write the products that are zero as ``0``. ``dynx doctor --fix`` does so; two engines read a
+    What to do: write the products that are zero as ``0``. ``dynx doctor --fix`` does so. Two engines read a
     missing product as zero. A number under a misspelled name, ``iyx="0.01"``, is what was meant, and gets the
-    right name. A missing moment (``ixx``, ``iyy``, ``izz``) is DX410: no body has a zero moment, and
-    the file does not contain the number.
+    right name. A missing moment (``ixx``, ``iyy``, ``izz``) is DX410: no body has a zero moment, and the file
+    does not contain the number.
     """
 
     stage = "reading"
@@ -475,16 +475,16 @@ class IncompleteInertial(EditingRule):
     none: ``<inertia/>`` is what is left of a template.
 
     - Pinocchio 4.1 reports that on stderr. Without a mass it drops the whole inertial, so the link weighs
-      nothing; without a tensor the link is a point mass.
+      nothing. Without a tensor the link is a point mass.
     - PyBullet 3.2.7 and MuJoCo 4.0 refuse the file.
-    - Drake 1.51 reads missing parts as zero: a link with a mass and no tensor is a point mass. One with a
-      tensor and no mass is impossible; Drake warns and replaces it.
+    - Drake 1.51 reads missing parts as zero: a link with a mass and no tensor is a point mass. An
+      ``<inertial>`` with a tensor and no mass is impossible. Drake warns and replaces it.
 
     The effect is a file that does not load, or a link without its mass: of order 0.01 to 1 in the mass
     matrix.
 
     What to do: complete it. A number under a misspelled name, ``<mass valeu="1.5"/>`` or ``ixxx="0.02"``, is
-    what was meant; ``dynx doctor --fix`` corrects the name. Otherwise it can only guess, and the report says
+    what was meant. ``dynx doctor --fix`` corrects the name. Otherwise it can only guess, and the report says
     so. A number between the tags, ``<mass>2.5</mass>``, is the mass. A tensor without mass is dropped, so the
     link weighs nothing. A mass without tensor stays as a point mass at the origin of the inertial, as in
     Pinocchio and Drake. ``--choose DX410=weightless`` drops that mass too.

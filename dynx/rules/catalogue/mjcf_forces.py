@@ -99,7 +99,7 @@ class GravityCompensation(CallingRule):
 
     What to do: compensate the weight by your controller, by the gravity torque of the model. The file is
     correct, so ``dynx doctor --fix`` does not change it. dynx does not read it and says so in the notes of
-    the model; doctor prints the call that switches the compensation off in MuJoCo.
+    the model. The doctor prints the call that switches the compensation off in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -133,7 +133,7 @@ class TendonForces(CallingRule):
 
     What to do: write the forces of the tendons into your controller where an engine has none. The file is
     correct, so ``dynx doctor --fix`` does not change it. dynx does not read tendons, and says so in the notes
-    of the model; doctor prints the call that switches their forces off in MuJoCo.
+    of the model. The doctor prints the call that switches their forces off in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -165,7 +165,7 @@ class ActuatorForces(CallingRule):
 
     The effect is the force of the actuator: gain times the distance from 0.
 
-    What to do: know that a robot with such actuators is held in MuJoCo and falls elsewhere; port the gains
+    What to do: know that a robot with such actuators is held in MuJoCo and falls elsewhere. Port the gains
     into your controller. The file is correct, so ``dynx doctor --fix`` does not change it. doctor compares
     without actuators, and prints the call that switches them off.
     """
@@ -194,8 +194,9 @@ class EqualityAsConstraint(CallingRule):
     - MuJoCo 4.0 adds their forces to ``mj_inverse`` and ``mj_forward``, wherever they are violated: a
       thousand times the torque of the rigid bodies was measured.
     - Drake 1.51 makes a constraint of ``connect`` and ``weld`` with which a continuous plant computes no
-      forward dynamics; inverse dynamics is that of the open tree. It drops others with a warning.
-    - Pinocchio 4.1: ``buildModelFromMJCF`` leaves loops open; ``buildModelAndConstraintsFromMJCF`` returns
+      forward dynamics. Its inverse dynamics ignores the constraint, as for an open tree. It drops others with
+      a warning.
+    - Pinocchio 4.1: ``buildModelFromMJCF`` leaves loops open. ``buildModelAndConstraintsFromMJCF`` returns
       the constraints apart. PyBullet 3.2.7 (``loadMJCF``) drops them.
 
     Without its constraints a robot with closed loops, such as a Cassie, is another robot.
@@ -232,7 +233,7 @@ class FluidForces(CallingRule):
     The effect grows with speed and with the size of the bodies: a swimmer does not move at all without it.
 
     What to do: leave the medium out for robots on land. The file is correct, so ``dynx doctor --fix`` does
-    not change it. dynx has no medium, and says so in the notes of the model; doctor compares without a
+    not change it. dynx has no medium, and says so in the notes of the model. The doctor compares without a
     medium, and prints the call that switches it off in MuJoCo.
     """
 

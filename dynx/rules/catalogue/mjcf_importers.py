@@ -57,7 +57,7 @@ class InertiaByDefaultClass(EditingRule):
     The effect is the mass of the body, by any factor.
 
     What to do: write an ``<inertial>`` for the body. ``dynx doctor --fix`` does so, with the numbers that
-    follow from the geoms by the rules of MuJoCo; all engines read them.
+    follow from the geoms by the rules of MuJoCo. All engines read them.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -290,11 +290,11 @@ class SeveralJointsInBody(EditingRule):
 class FrameOfBodies(Rule):
     """DX608 frame-of-bodies: A ``<frame>`` or ``<replicate>`` holds bodies, which importers leave out.
 
-    ``<frame pos="0 0 1">`` moves all that it holds; ``<replicate count="4" euler="0 0 90">`` repeats it.
+    ``<frame pos="0 0 1">`` moves all that it holds. ``<replicate count="4" euler="0 0 90">`` repeats it.
 
     - MuJoCo 4.0 reads both.
     - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) skip the element
-      with all bodies, joints and geoms in it; Drake warns.
+      with all bodies, joints and geoms in it. Drake warns.
 
     The robot lacks these bodies, and an engine whose robot lacks a joint cannot be compared.
 
@@ -324,7 +324,7 @@ class SeveralBodiesInWorld(Rule):
     - MuJoCo 4.0 and Drake 1.51 load all of them.
     - Pinocchio 4.1 (``buildModelFromMJCF``) loads the first body of the world and what it carries, and drops
       the others without a message.
-    - PyBullet 3.2.7 (``loadMJCF``) makes a robot of each; ``loadMJCF`` returns several.
+    - PyBullet 3.2.7 (``loadMJCF``) makes a robot of each. ``loadMJCF`` returns several.
 
     Where the table comes first, the robot of Pinocchio has no joint.
 
@@ -454,7 +454,7 @@ class JointWithoutName(EditingRule):
 
     Names of joints are optional in MJCF.
 
-    - MuJoCo 4.0 leaves the joint without a name; it has a number.
+    - MuJoCo 4.0 leaves the joint without a name. It has a number.
     - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) make names of the
       names of bodies or of numbers, each in its own way: ``leg_joint_0``, ``trunk-leg``, ``joint2_4_2``.
 
@@ -494,15 +494,15 @@ class InertiaFromShapesOfMjcf(CallingRule):
 
     - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read both.
     - PyBullet 3.2.7 (``loadMJCF``) reads the mass and the centre of mass. It computes the moments from the
-      bounding box of the shapes; without shapes they are 0. For a body without ``<inertial>`` it computes the
+      bounding box of the shapes. Without shapes they are 0. For a body without ``<inertial>`` it computes the
       mass from a density of 1000, and does not read ``mass`` of a geom. No flag of ``loadMJCF`` changes that:
       with ``URDF_USE_INERTIA_FROM_FILE`` all moments are 0.
 
     The effect is the inertia of every body: tens of per cent of the mass matrix for most robots.
 
     What to do: set the masses and the moments of the file after loading, or convert the file to URDF
-    (``dynx convert --to urdf``) and load it with the flag. The file is correct, so ``dynx doctor --fix``
-    does not change it; doctor prints the call.
+    (``dynx convert --to urdf``) and load it with the flag. The file is correct, so ``dynx doctor --fix`` does
+    not change it. The doctor prints the call.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)

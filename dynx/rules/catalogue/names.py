@@ -92,7 +92,7 @@ class JointNamedUniverse(EditingRule):
     in all four.
 
     What to do: give the joint another name. ``dynx doctor --fix`` calls it ``universe_joint``, in mimic
-    joints, transmissions and Gazebo references too; programs that look the joint up by its name must be
+    joints, transmissions and Gazebo references too. Programs that look the joint up by its name must be
     changed with it.
     """
 
@@ -127,7 +127,7 @@ class JointNamedRootJoint(EditingRule):
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file as intended.
 
     What to do: give the joint another name. ``dynx doctor --fix`` calls it ``root_joint_1``, in mimic joints,
-    transmissions and Gazebo references too; programs that look the joint up by its name must be changed with
+    transmissions and Gazebo references too. Programs that look the joint up by its name must be changed with
     it. Where the name must be kept, programs can give the free joint another name by the third argument:
     ``buildModelFromUrdf(path, JointModelFreeFlyer(), "free_flyer")``. The file is corrected all the same,
     because users who load it in the usual way get no warning.
@@ -154,7 +154,7 @@ class RobotWithoutName(EditingRule):
     URDF requires ``<robot name="...">``. Nothing in the dynamics depends on it, but it decides whether the
     file loads.
 
-    - Pinocchio 4.1 and PyBullet 3.2.7 refuse a robot without the attribute; both accept an empty name.
+    - Pinocchio 4.1 and PyBullet 3.2.7 refuse a robot without the attribute. Both accept an empty name.
     - Drake 1.51 refuses both.
     - MuJoCo 4.0 reads both. So does dynx, which then names the robot after its file.
 
@@ -235,7 +235,7 @@ class NameWithBlanks(EditingRule):
     dynx.
 
     What to do: write the name without them. ``dynx doctor --fix`` does so with ``--choose DX533=trim``,
-    wherever the document names the link or joint; a name of blanks alone becomes ``link`` or ``joint``, with
+    wherever the document names the link or joint. A name of blanks alone becomes ``link`` or ``joint``, with
     a number where that is taken. By default it leaves the names, which programs may use.
     """
 

@@ -66,7 +66,7 @@ class CommaBetweenNumbers(MisspelledNumberRule):
 
     URDF separates the numbers of a vector by blanks. Other formats use commas or semicolons.
 
-    - Pinocchio 4.1 refuses the file where the vector is in a ``<joint>``; in an ``<inertial>`` it drops the
+    - Pinocchio 4.1 refuses the file where the vector is in a ``<joint>``. In an ``<inertial>`` it drops the
       whole inertial with a line on stderr, so the link weighs nothing.
     - PyBullet 3.2.7 reads ``1, 2, 3`` as intended, because it reads the number at the beginning of each word.
       Without blanks, ``1,2,3``, it finds one word instead of three, prints a warning and uses zeros: a joint
@@ -99,14 +99,14 @@ class TextAfterNumber(MisspelledNumberRule):
     - PyBullet 3.2.7 reads the number at the beginning and ignores the rest, without a warning. ``1.5d-3`` is
       then 1.5, a thousand times too large.
     - MuJoCo 4.0 refuses the file and names the line, but reads hexadecimal numbers.
-    - Drake 1.51 reads single numbers as PyBullet does and refuses vectors; it reads a hexadecimal number as
+    - Drake 1.51 reads single numbers as PyBullet does and refuses vectors. It reads a hexadecimal number as
       0.
 
     The effect ranges from none (a limit that is not used) to a link without mass. Of the files that come with
     PyBullet, ``biped/biped2d_pybullet.urdf`` has ``-1.57.``.
 
     What to do: write the number alone, in SI units. ``dynx doctor --fix`` keeps the number where a point or
-    the name of its SI unit follows (``1.57.``, ``2.5 kg``); a Fortran exponent is rewritten with ``e``, a
+    the name of its SI unit follows (``1.57.``, ``2.5 kg``). A Fortran exponent is rewritten with ``e``, a
     hexadecimal number in decimals. Text that would make another number of it (``25mm``, ``90deg``, ``1/5``)
     and words with no number at the beginning (``heavy``) are DX420.
     """
@@ -127,10 +127,10 @@ class VectorOfWrongLength(MisspelledNumberRule):
 
     ``rpy="-3.14159 1.57079 0 0"`` has one too many, ``xyz="0.2 0.1"`` one too few.
 
-    - Pinocchio 4.1 refuses the file where the vector is in a ``<joint>``; in an ``<inertial>`` it drops the
+    - Pinocchio 4.1 refuses the file where the vector is in a ``<joint>``. In an ``<inertial>`` it drops the
       whole inertial with a line on stderr, so the link weighs nothing.
     - PyBullet 3.2.7 uses the first three of four numbers without a warning. With two it prints a warning and
-      uses zeros for all three; in an ``<axis>`` it refuses the file.
+      uses zeros for all three. In an ``<axis>`` it refuses the file.
     - MuJoCo 4.0 and Drake 1.51 refuse the file.
 
     The effect of a vector that became zero is of order 1 in the positions of all links behind it. Of the
@@ -177,8 +177,8 @@ class BlankAfterNumber(MisspelledNumberRule):
 
     PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the number, and so does dynx. In front of a number all
     engines read blanks, tabs and line breaks. No engine treats a no-break space (U+00A0) as a blank: MuJoCo
-    refuses it behind a number; in front of one PyBullet reads 0, and MuJoCo and Drake refuse the file. Blanks
-    between and around the three numbers of a vector are accepted everywhere (tabs are not, see DX406).
+    refuses it behind a number. In front of a number PyBullet reads 0, and MuJoCo and Drake refuse the file.
+    Blanks between and around the three numbers of a vector are accepted everywhere (tabs are not, see DX406).
 
     The effect is a link without mass, or without a moment of inertia: the mass matrix is off by as much as
     the link matters, of order 0.01 to 1.
@@ -204,7 +204,7 @@ class TabInVector(MisspelledNumberRule):
     text can hold another kind of blank, such as the no-break space U+00A0.
 
     - Pinocchio 4.1 separates numbers at blanks alone. A tab in a vector of a ``<joint>`` makes it refuse the
-      file; in an ``<inertial>`` it drops the whole inertial with a line on stderr, so the link weighs
+      file. In an ``<inertial>`` it drops the whole inertial with a line on stderr, so the link weighs
       nothing.
     - PyBullet 3.2.7 separates numbers at blanks alone too. It finds one word instead of three, prints a
       warning and uses zeros. Where there are both blanks and line breaks it can find three words that are not
@@ -231,7 +231,7 @@ class InfiniteLimit(MisspelledNumberRule):
     notation for infinity, and engines differ in reading one.
 
     - Pinocchio 4.1 and Drake 1.51 refuse the file.
-    - PyBullet 3.2.7 and MuJoCo 4.0 read an infinity; MuJoCo refuses ``1e999``.
+    - PyBullet 3.2.7 and MuJoCo 4.0 read an infinity. MuJoCo refuses ``1e999``.
 
     dynx refuses it too, because half of the engines do.
 
@@ -256,10 +256,10 @@ class EmptyVector(MisspelledNumberRule):
     The variable of a template was empty, or an exporter had no value. URDF's default for a missing attribute
     is zero, and a person would read an empty vector so.
 
-    - Pinocchio 4.1 refuses the file where the origin is that of a ``<joint>``; in an ``<inertial>`` it drops
+    - Pinocchio 4.1 refuses the file where the origin is that of a ``<joint>``. In an ``<inertial>`` it drops
       the whole inertial with a line on stderr, so the link weighs nothing.
     - Drake 1.51 refuses the file.
-    - PyBullet 3.2.7 prints a warning and uses zeros; MuJoCo 4.0 uses zeros. So does dynx.
+    - PyBullet 3.2.7 prints a warning and uses zeros. MuJoCo 4.0 uses zeros. So does dynx.
 
     The effect is a file that does not load, or a link without mass: of order 0.01 to 1 in the mass matrix.
 
@@ -344,7 +344,7 @@ class MinusNotAscii(MisspelledNumberRule):
     Text that was copied from a document or a web page has the minus sign U+2212 or a dash in front of
     negative numbers. It looks like ``-``, and no engine knows it.
 
-    - Pinocchio 4.1 refuses the file where the number is in a ``<joint>``; in an ``<inertial>`` it drops the
+    - Pinocchio 4.1 refuses the file where the number is in a ``<joint>``. In an ``<inertial>`` it drops the
       whole inertial, or the tensor, with a line on stderr.
     - PyBullet 3.2.7 reads 0, without a warning.
     - MuJoCo 4.0 and Drake 1.51 refuse the file.
@@ -378,7 +378,7 @@ class ExpressionNotExpanded(EditingRule):
 
     - In a ``<collision>`` MuJoCo 4.0 refuses the file ("bad format in attribute 'rpy'").
     - In ``<calibration>``, ``<safety_controller>``, the position limits of a continuous joint, and the
-      ``<limit>``, ``<dynamics>`` and ``<mimic>`` of a fixed joint, Pinocchio 4.1 refuses the file; so does
+      ``<limit>``, ``<dynamics>`` and ``<mimic>`` of a fixed joint, Pinocchio 4.1 refuses the file. So does
       Drake 1.51 in these limits and this ``<mimic>``.
     - PyBullet 3.2.7 reads 0, without a warning: the shape is elsewhere, or has no size.
 

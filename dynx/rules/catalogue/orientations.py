@@ -38,7 +38,7 @@ class OrientationAsQuaternion(EditingRule):
     mass matrix if the quaternion is in an ``<inertial>``.
 
     What to do: write the orientation as ``rpy``, with all digits. ``dynx doctor --fix`` does so, from the
-    quaternion scaled to length 1; the orientation is the same to rounding. In a file that states no such
+    quaternion scaled to length 1. The orientation is the same to rounding. In a file that states no such
     version every engine ignores the quaternion, see DX530.
     """
 
@@ -66,9 +66,9 @@ class UnreadableQuaternion(EditingRule):
     """DX419 unreadable-quaternion: The quaternion of an origin is no rotation, or stands beside ``rpy``.
 
     In URDF from version 1.1 on ``quat_xyzw`` takes four numbers separated by blanks, not all zero, and no
-    ``rpy`` beside them. Only Pinocchio reads it, see DX418; so it is also the only engine that objects.
+    ``rpy`` beside them. Only Pinocchio reads it, see DX418. So it is also the only engine that objects.
 
-    - Pinocchio 4.1 refuses the file where the origin is that of a ``<joint>``; in an ``<inertial>`` it drops
+    - Pinocchio 4.1 refuses the file where the origin is that of a ``<joint>``. In an ``<inertial>`` it drops
       the whole inertial with a line on stderr, so the link weighs nothing. A quaternion of length 0 is no
       rotation to it, without a warning.
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 use ``rpy``, or no rotation where there is none.
@@ -121,7 +121,7 @@ class AngleInDegrees(Rule):
     All engines read radians: 90 is 14.3 turns. They agree, but on a robot with wrong poses or joints without
     effective stops.
 
-    That the unit is degrees is a guess, so no edit removes the cause; the message gives the value in radians.
+    That the unit is degrees is a guess, so no edit removes the cause. The message gives the value in radians.
     """
 
     kind = "practice"
@@ -239,7 +239,7 @@ class QuaternionWithoutVersion(EditingRule):
     ``rpy``.
 
     What to do: write the orientation as ``rpy``, which every engine reads. ``dynx doctor --fix`` does so with
-    ``--choose DX530=rpy``, which changes the robot to what the quaternion states; by default it leaves the
+    ``--choose DX530=rpy``, which changes the robot to what the quaternion states. By default it leaves the
     file as it is. Adding the version alone would help in Pinocchio only, see DX418.
     """
 

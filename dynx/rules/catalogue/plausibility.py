@@ -266,8 +266,8 @@ class MassRatioExtreme(Rule):
     """DX505 mass-ratio-extreme: Two bodies that a joint connects differ in mass by a factor of a million or
     more.
 
-    Links that fixed joints hold together count as one body; a body without mass is not reported here. A sum
-    in double precision carries 16 digits; where a joint connects bodies a million apart, six of them are lost
+    Links that fixed joints hold together count as one body. A body without mass is not reported here. A sum
+    in double precision carries 16 digits. Where a joint connects bodies a million apart, six of them are lost
     to the difference of scale. The worst case is a light body that carries a heavy one.
 
     This affects simulators that solve joints as constraints between free bodies (ODE in Gazebo, contacts in

@@ -34,14 +34,15 @@ class InertiaFromShapesOfSdf(CallingRule):
 
     - Drake 1.51 reads both.
     - PyBullet 3.2.7 (``loadSDF``) reads the mass and the pose of the inertial. It computes the moments from
-      the bounding box of the collision shapes, and has no flag for those of the file; without shapes they are
+      the bounding box of the collision shapes, and has no flag for those of the file. Without shapes they are
       0.
 
     The effect is the inertia of every link: tens of per cent of the mass matrix for most robots.
 
-    What to do: set the moments of the file after loading, or convert the file to URDF (``dynx convert --to
-    urdf``) and load it with ``URDF_USE_INERTIA_FROM_FILE``. The file is correct, so ``dynx doctor --fix``
-    does not change it; doctor prints the call. Products of inertia remain an error, as PyBullet has none.
+    What to do: set the moments of the file after loading, or convert the file to URDF
+    (``dynx convert --to urdf``) and load it with ``URDF_USE_INERTIA_FROM_FILE``. The file is correct, so
+    ``dynx doctor --fix`` does not change it. The doctor prints the call. Products of inertia remain an error,
+    as PyBullet has none.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -85,13 +86,14 @@ def _text(case: Case, element: SourceElement) -> str:
 class AxisWithoutLimit(EditingRule):
     """DX702 axis-without-limit: An axis of SDF has no limit, for which PyBullet refuses the file.
 
-    ``<limit>`` of an ``<axis>`` is optional; without it a joint is unlimited.
+    ``<limit>`` of an ``<axis>`` is optional. Without it a joint is unlimited.
 
     - Drake 1.51 reads an unlimited joint.
     - PyBullet 3.2.7 (``loadSDF``) refuses the whole file: "Cannot load SDF file". It does so for revolute and
       prismatic joints, and not for continuous ones.
 
-    What to do: write a limit; 1e16 is none, by the convention of the format. ``dynx doctor --fix`` does so.
+    What to do: write a limit. 1e16 means no limit, by the convention of the format. ``dynx doctor --fix``
+    does so.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -153,7 +155,7 @@ class FramesOfSdf(Rule):
 
     - Drake 1.51 reads all of these.
     - PyBullet 3.2.7 (``loadSDF``) reads six numbers of the pose of a link, in the frame of the model, and the
-      axis in the frame of the child. It drops the attributes, and the pose of a joint; a pose without numbers
+      axis in the frame of the child. It drops the attributes, and the pose of a joint. A pose without numbers
       ends the process.
 
     The effect is another pose of the link, or another axis.
@@ -225,8 +227,8 @@ class SpringOfSdf(Rule):
 
     The effect is the stiffness times the distance from the reference.
 
-    What to do: decide whether torques include springs. The file is correct, so ``dynx doctor --fix`` does
-    not change it. dynx reads springs, and its quantities have them with ``joint_dynamics=True``; doctor
+    What to do: decide whether torques include springs. The file is correct, so ``dynx doctor --fix`` does not
+    change it. dynx reads springs, and its quantities have them with ``joint_dynamics=True``. The doctor
     compares the rigid bodies alone. No call removes the force element, so the effect in a report is what
     remains of the difference without all other causes.
     """
@@ -249,13 +251,13 @@ class EmptyDynamicsOfSdf(EditingRule):
     """DX707 empty-dynamics-of-sdf: A dynamics element of SDF has neither damping nor friction, for which
     PyBullet refuses the file.
 
-    ``<dynamics>`` of an ``<axis>`` may hold a spring alone; damping and friction are then 0.
+    ``<dynamics>`` of an ``<axis>`` may hold a spring alone. Damping and friction are then 0.
 
     - Drake 1.51 reads it so.
     - PyBullet 3.2.7 (``loadSDF``) refuses the whole file: "joint dynamics element specified with no damping
       and no friction". It does the same for URDF (DX305).
 
-    What to do: write ``<damping>0</damping>``. ``dynx doctor --fix`` does so; nothing else changes in the
+    What to do: write ``<damping>0</damping>``. ``dynx doctor --fix`` does so. Nothing else changes in the
     element.
     """
 

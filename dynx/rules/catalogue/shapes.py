@@ -30,7 +30,7 @@ class UnknownCollisionShape(EditingRule):
     mesh (and capsule in later versions).
 
     - MuJoCo 4.0 refuses the file: "visual geometry specification not found", also for a collision.
-    - Pinocchio 4.1 drops the shape with a line on stderr; Drake 1.51 warns about it or ignores it.
+    - Pinocchio 4.1 drops the shape with a line on stderr. Drake 1.51 warns about it or ignores it.
     - PyBullet 3.2.7 reads it.
 
     The dynamics of a link that states its inertia does not depend on shapes. But some engines refuse the
@@ -119,11 +119,11 @@ class CollisionShapeWithoutSize(EditingRule):
     - MuJoCo 4.0 refuses the file if a size of a box, sphere, cylinder or capsule is not positive ("size 0
       must be positive in geom"). It also refuses a missing attribute ("required attribute missing"). Every
       positive size will do, however small.
-    - PyBullet 3.2.7 reads sizes of zero and below; it refuses the file ("Cannot load URDF file") where the
+    - PyBullet 3.2.7 reads sizes of zero and below. It refuses the file ("Cannot load URDF file") where the
       attribute is missing.
     - Both refuse a ``<mesh>`` without ``filename``, or with an empty one.
     - Drake 1.51 reads shapes only into a scene graph. Then a size that is not positive, of a visual shape
-      too, raises ``SystemExit``, which ends the program; it accepts a sphere of radius zero.
+      too, raises ``SystemExit``, which ends the program. It accepts a sphere of radius zero.
     - Pinocchio 4.1 reads no shapes into a model.
 
     The dynamics of a link that states its inertia does not depend on shapes. But some engines refuse the
@@ -253,15 +253,15 @@ class MeshNotFound(Rule):
 
     PyBullet 3.2.7 refuses the whole file ("Cannot load URDF file") for a mesh in ``<visual>`` or in
     ``<collision>``, and so does Drake 1.51 with a scene graph. MuJoCo 4.0 refuses it for ``<collision>``
-    alone, because it discards visual shapes. A texture in ``<visual>`` is missed by Drake with a scene graph
-    alone; one in a material of the robot is DX426. Pinocchio's ``buildModelFromUrdf`` reads no mesh, its
-    ``buildGeomFromUrdf`` raises. PyBullet takes every path, ``/meshes/a.stl`` too, as relative to the folder
-    of the description and to each folder above it. It also searches folders of its own
+    alone, because it discards visual shapes. Only Drake with a scene graph misses a texture in ``<visual>``.
+    A missing texture in a material of the robot is DX426. Pinocchio's ``buildModelFromUrdf`` reads no mesh,
+    its ``buildGeomFromUrdf`` raises. PyBullet takes every path, ``/meshes/a.stl`` too, as relative to the
+    folder of the description and to each folder above it. It also searches folders of its own
     (``setAdditionalSearchPath``), so it may find meshes that other engines do not find. The message says
     which file it finds in the package or repository. Dynamics does not depend on shapes, and dynx reads the
     file without them.
 
-    The description does not say which file was meant, so no edit removes the cause; the message gives the
+    The description does not say which file was meant, so no edit removes the cause. The message gives the
     nearest name.
     """
 

@@ -18,13 +18,13 @@ from dynx.rules.joints import TYPES, fresh_name, joint_split, joints_of_type, sp
 class JointOfSeveralFreedoms(EditingRule):
     """DX210 joint-of-several-freedoms: A joint is spherical, planar or floating.
 
-    URDF knows ``planar`` and ``floating``; ``spherical`` and ``ball`` are extensions. No other feature is
+    URDF knows ``planar`` and ``floating``. ``spherical`` and ``ball`` are extensions. No other feature is
     read in so many different ways:
 
-    - ``spherical``: Pinocchio 4.1 and Drake 1.51 refuse the file. PyBullet 3.2.7 reads it; mass matrix and
+    - ``spherical``: Pinocchio 4.1 and Drake 1.51 refuse the file. PyBullet 3.2.7 reads it. Mass matrix and
       inverse dynamics then have other coordinates than the joint states or fail. MuJoCo 4.0 reads it with
       quaternions, and refuses the usual limits on it. No engine reads ``ball``.
-    - ``planar``: Pinocchio has (x, y, cos, sin), MuJoCo and Drake three joints or coordinates; PyBullet moves
+    - ``planar``: Pinocchio has (x, y, cos, sin), MuJoCo and Drake three joints or coordinates. PyBullet moves
       it but cannot do dynamics.
     - ``floating`` in the middle of a tree: Pinocchio has a quaternion. PyBullet makes the joint FIXED and
       prints one line on stdout. MuJoCo and Drake refuse it or leave the link free in the world.
@@ -33,7 +33,7 @@ class JointOfSeveralFreedoms(EditingRule):
 
     What to do: write joints of one degree of freedom each, with massless links between them.
     ``dynx doctor --fix`` does so: three rotations for a spherical joint, two translations and a rotation for
-    a planar one, three of each for a floating one. The chain has the same motion; its coordinates are angles,
+    a planar one, three of each for a floating one. The chain has the same motion. Its coordinates are angles,
     singular where the middle angle is 90 degrees, and limits of the joint are dropped. MuJoCo refuses
     massless links that move (DX110), so the links in between weigh 2e-15 kg. ``--choose DX210=fixed`` makes
     the joint fixed instead.
@@ -70,10 +70,10 @@ class FloatingJointAtRoot(EditingRule):
     loads it.
 
     - PyBullet 3.2.7 makes the joint fixed, and prints one line on stdout. Then ``useFixedBase`` decides.
-    - Pinocchio 4.1 gives the joint seven coordinates; ``JointModelFreeFlyer`` as a root joint gives seven
+    - Pinocchio 4.1 gives the joint seven coordinates. ``JointModelFreeFlyer`` as a root joint gives seven
       more. The other joints are right as long as the seven are held.
     - MuJoCo 4.0 makes it a free joint whatever is below.
-    - Drake 1.51 does not know the type; it leaves the child free in the world and its quaternion at zero.
+    - Drake 1.51 does not know the type. It leaves the child free in the world and its quaternion at zero.
 
     dynx reads the joint as fixed and leaves the decision to ``base=``.
 
@@ -101,7 +101,7 @@ class TooManyJoints(Rule):
     """DX212 too-many-joints: The robot has more joints than PyBullet supports.
 
     PyBullet 3.2.7 has room for 127 joints, and counts fixed ones. From the 128th on ``getJointState`` and
-    ``getLinkState`` fail, so there are no positions; above 128 coordinates ``calculateInverseDynamics``,
+    ``getLinkState`` fail, so there are no positions. Above 128 coordinates ``calculateInverseDynamics``,
     ``calculateMassMatrix`` and ``calculateJacobian`` return wrong results without a warning (20 % at 129).
     Hands with sensors and robots with many named frames exceed this: ``tiago_dual`` of example-robot-data has
     129 joints.
@@ -110,7 +110,7 @@ class TooManyJoints(Rule):
 
     What to do: drop frames that PyBullet does not need. ``dynx doctor --fix`` removes links that have no
     mass, nothing attached to them and a fixed joint: that is, frames. It removes as few as are needed, those
-    without shapes and at the end of the file first. The dynamics is unchanged; programs that use these frames
+    without shapes and at the end of the file first. The dynamics is unchanged. Programs that use these frames
     need the original file. ``--choose DX212=keep`` keeps them, and PyBullet cannot load the robot. Where
     there are not enough of them, or too many joints move, there is no remedy.
     """
@@ -225,7 +225,7 @@ class WorldNotDeclared(EditingRule):
 
     What to do: declare ``<link name="world"/>``. ``dynx doctor --fix`` does so, at the beginning of the
     robot. All engines then read the robot that Drake reads: a root of this name on a fixed base is harmless
-    in all of them. Load such a robot with the fixed base; on a floating one the world would float, see DX109.
+    in all of them. Load such a robot with the fixed base. On a floating one the world would float, see DX109.
     """
 
     stage = "reading"
@@ -338,7 +338,7 @@ class JointOfDrake(EditingRule):
 
     - Drake 1.51.1 adds the joint.
     - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 skip the element. So does dynx, with a note. The child is
-      then the root of a tree of its own (DX223), unless another joint carries it; Drake refuses the file in
+      then the root of a tree of its own (DX223), unless another joint carries it. Drake refuses the file in
       that case ("form one or more loops").
 
     What to do: write joints that URDF has, in a chain with small links between them (see DX210), or use the

@@ -19,7 +19,7 @@ class TransmissionOfNothing(EditingRule):
       name, or names a joint that the file does not have. It ignores types other than ``SimpleTransmission``.
     - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore transmissions.
 
-    What to do: complete the transmission or remove it. ``dynx doctor --fix`` removes it; nothing in the
+    What to do: complete the transmission or remove it. ``dynx doctor --fix`` removes it. Nothing in the
     dynamics depends on it. If ROS controllers should use it, complete it instead.
     """
 
@@ -62,7 +62,7 @@ class ActuatorNamedTwice(EditingRule):
     Transmissions of fixed joints, of joints with an effort limit of 0, and of other types than
     ``SimpleTransmission`` are ignored.
 
-    A copied transmission of which only the joint was changed causes this; ``xarm6_robot.urdf``, which comes
+    A copied transmission of which only the joint was changed causes this. ``xarm6_robot.urdf``, which comes
     with PyBullet, has two actuators ``motor3``.
 
     What to do: give each actuator its own name. ``dynx doctor --fix`` adds a number to the later ones.
