@@ -43,7 +43,7 @@ from dynx.same.skeleton import Skeleton, exact_skeleton, without_standing_mimics
 Robot = StrPath | bytes | bytearray | Model
 
 TOLERANCE = 1e-9
-"""Default of the largest difference of one robot, relative to the natural magnitude."""
+"""Default of the largest difference of one robot, relative to the scale of the quantity."""
 
 MAX_EFFECTS = 64
 """Largest number of differences of which effects are measured."""
@@ -101,10 +101,10 @@ def same_robot(
 
     Links are merged across fixed joints; what remains of a robot are the lines of its joint axes at the zero
     positions, and the base inertial parameters of its bodies (Gautier and Khalil 1990). Frames of links, the
-    signs of axes, and inertia that no state shows are freedoms of a description. The robots are the same if
-    all else differs by at most `tolerance` of its natural magnitude: the reach of the robot for lengths,
-    1 rad for angles, the body's own inertia for inertias. It is computed in 50 digits from the decimals of
-    the files. Where the robots differ, the report has the fewest elements of `b` to replace, and `b` mended.
+    signs of axes, and inertia that no state shows may differ (`SameReport.freedoms`). The robots are the same
+    if all else differs by at most `tolerance` of its scale: the reach of the robot for lengths, 1 rad for
+    angles, the body's own inertia for inertias. dynx computes differences in 50 digits from the decimals of
+    the files. If the robots differ, the report has the fewest elements of `b` to replace, and `b` mended.
 
     Raises the errors of `dynx.load`; ArgumentError for a `tolerance` that is no number from 0 to below 1.
     """

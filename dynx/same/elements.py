@@ -65,7 +65,7 @@ class FieldChange:
 class DifferingElement:
     """A part of a joint or link of `theirs` that differs from `ours`.
 
-    `size` is the difference relative to its natural magnitude: the length of the robot, 1 rad, or the body's
+    `size` is the difference relative to its scale: the reach of the robot, 1 rad, or the body's
     own inertia. `first` and `second` are the values in the two descriptions, `changes` what replaces it.
     """
 
@@ -85,7 +85,7 @@ class DifferingElement:
 @dataclass(frozen=True)
 class Unseen:
     """Links whose inertias differ without effect; `size` is what is seen of the differences of all of them,
-    relative to its natural magnitude: 0 where no state shows anything."""
+    relative to its scale: 0 where no state shows anything."""
 
     ours: str | None
     theirs: str

@@ -67,7 +67,7 @@ class Observability:
 
     def seen(self, regrouped: Iterable[Differences]) -> dict[int, float]:
         """Return, for each body in whose parameters the sum of some regrouped differences is seen, its size
-        relative to the natural magnitude of the body (`inertia_ratio`)."""
+        relative to the scale of the body (`inertia_ratio`)."""
         total: dict[int, RigidInertia] = {}
         for each in regrouped:
             for body, inertia in each.items():

@@ -23,10 +23,10 @@ class ElementDifference:
     """An element of the second description that differs: a part of a joint or link, with the values and lines
     in both.
 
-    `size` is relative to the natural magnitude: the reach of the robot for a length, 1 rad for an angle, and
-    for an inertia that of the body. `wanted` is what it is in the mended file, in the frames of that file.
-    `effect` is what the element alone changes; None where it changes the number of coordinates, or where the
-    description is not mended.
+    `size` is relative to a scale: the reach of the robot for a length, 1 rad for an angle, and the inertia of
+    the body for an inertia. `wanted` is the value in the mended file, in the frames of that file. `effect` is
+    the change that this element alone causes. It is None if the element changes the number of coordinates, or
+    if the description is not mended.
     """
 
     part: Part

@@ -1,4 +1,4 @@
-"""Natural magnitudes of the inertial parameters of a body, by which a difference is divided."""
+"""Scales of the inertial parameters of a body, by which a difference is divided."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dynx.spatial.so3 import skew
 
 
 class Whole(NamedTuple):
-    """Mass [kg] and reach [m] of a whole robot: the magnitudes where a body has none of its own."""
+    """Mass [kg] and reach [m] of a whole robot: the scales of a body that has none of its own."""
 
     mass: float
     length: float
@@ -22,11 +22,11 @@ POINT = 1e-12
 
 
 def inertia_ratio(difference: RigidInertia, inertia: RigidInertia, whole: Whole) -> float:
-    """Return the largest difference of a parameter, relative to the natural magnitude of the body's inertia.
+    """Return the largest difference of a parameter, relative to the scale of the body's inertia.
 
     Mass is divided by the mass m; first moment by m times the larger of the distance of the centre of mass
     from the origin and the radius of gyration; the tensor, about the centre of mass, by the largest moment
-    there. A body without mass has the magnitudes of the whole robot.
+    there. A body without mass has the scales of the whole robot.
     """
     dm = float(difference.mass)
     dh = np.asarray(difference.first_moment, dtype=float)

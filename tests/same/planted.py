@@ -1,4 +1,4 @@
-"""Differences planted into a robot: each changes one element by a given part of its natural magnitude."""
+"""Differences planted into a robot: each changes one element by a given part of its scale."""
 
 from __future__ import annotations
 

@@ -206,7 +206,7 @@ def doctor() -> None:
 @click.option(
     "--tolerance",
     type=FiniteRange(min=0.0, max=1.0, max_open=True),
-    help="Largest difference of one robot, relative to the natural magnitude (default: 1e-9).",
+    help="Largest difference of two equal robots, relative to reach, 1 rad or inertia (default: 1e-9).",
 )
 @click.option(
     "--fix",
