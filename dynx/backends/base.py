@@ -48,16 +48,17 @@ class Backend(QuantityCalls):
     `point` (3,) [m], in the frame's axes, moves the origin of the first two.
 
     `joint_dynamics=True` adds the armature, viscous damping, Coulomb friction and springs of the joints,
-    which every backend computes alike: ``armature * a + damping * v + friction * sign(v) + stiffness * (q -
-    spring_reference)`` to the torque, armature to the diagonal of the mass matrix, the energy of the springs
-    to the potential energy. By default only the rigid bodies count.
+    which every backend computes alike. It adds
+    ``armature * a + damping * v + friction * sign(v) + stiffness * (q - spring_reference)`` to the torque,
+    armature to the diagonal of the mass matrix, and the energy of the springs to the potential energy. By
+    default only the rigid bodies count.
 
     `external_forces` maps frame names to wrenches (..., 6), force [N] then moment [N m], that act on the
     robot; `force_reference` names their point and axes as `reference` does for a Jacobian.
 
-    Torques are generalised forces: [N m] for a revolute joint, [N] for a prismatic one, and for a floating
-    base the force and the moment at the base frame's origin, in its axes. `dynx.backends.quantities` is the
-    table of all quantities.
+    Torques are generalised forces: [N m] for a revolute joint, [N] for a prismatic joint. For a floating base
+    they are the force and the moment at the origin of the base frame, in its axes. `dynx.backends.quantities`
+    is the table of all quantities.
 
     A batch is a Python loop over the engine's calls unless the class is `vectorized`; NumPy evaluates a batch
     of the backend ``reference`` at once. The backend ``compiled`` gives the same numbers to rounding, and
@@ -405,9 +406,9 @@ class Backend(QuantityCalls):
         By default each is at the origin of the joint, in the axes of its child link: the frame of that link
         in the reference ``local``. `frame` names another frame for all, whose point and axes `reference`
         chooses as for a Jacobian. The component along the axis of a joint is its torque of
-        `inverse_dynamics`; with mimic joints, a torque is the sum of these of the driver and, times their
-        multipliers, of its followers. What a joint's damping, friction, armature and spring need is not part
-        of it: they act on the side of the motor.
+        `inverse_dynamics`. With mimic joints, the torque of an independent joint is its component, plus the
+        component of each follower times the multiplier of the follower. What a joint's damping, friction,
+        armature and spring need is not part of it: they act on the side of the motor.
 
         Featherstone 2008, table 5.1. Elsewhere: Pinocchio `computeSupportedForceByFrame`, Drake
         `get_reaction_forces_output_port`, MuJoCo `cfrc_int` (of each body, about the centre of mass of the

@@ -39,9 +39,9 @@ class JointFriction:
     Inverse dynamics adds it to the joint torque; the friction that acts on the joint is its negative.
 
     With `slip` 0 it is d v + f sign(v), as with ``joint_dynamics=True`` in every backend. A joint at rest
-    then has any torque between -f and f, whichever keeps it at rest; a function of the velocity cannot tell
-    it, so plants solve for it (`dynx.rbd.joint_friction`). A mimic joint's coefficients act on its
-    driver through its multiplier.
+    then has the torque between -f and f that keeps it at rest. This torque is no function of the velocity, so
+    plants solve for it (`dynx.rbd.joint_friction`). A mimic joint's coefficients act on its driver through
+    its multiplier.
     """
 
     model: Model

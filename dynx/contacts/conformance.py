@@ -136,10 +136,10 @@ def conform(
     Engines and cases are all that are installed unless named. Steps are 1e-6 to 0.1 s; with a single one no
     error can fall. `settings` are those of `World` by engine, `substeps` included; `candidates` are the
     settings to which errors may be attributed. Runs take place in `jobs` processes (default: one for each
-    processor), and a run that crashes or takes longer than `timeout` [s] is recorded as such; with 0 they
-    take place in this process, which a crash ends. `progress(done, total)` is called after each run; the
-    total grows when errors have to be attributed. With `interruptible`, KeyboardInterrupt ends the runs, and
-    the results so far are returned.
+    processor). dynx records a run that crashes or takes longer than `timeout` [s]. With 0 jobs the runs take
+    place in this process, which a crash ends. `progress(done, total)` is called after each run; the total
+    grows when errors have to be attributed. With `interruptible`, KeyboardInterrupt ends the runs, and the
+    results so far are returned.
 
     Raises the errors of `World` for engines and settings, UnknownNameError for the name of a case,
     ArgumentError for steps and for a case that cannot be used.

@@ -193,8 +193,8 @@ class ModelBased(Controller[ControllerState]):
     """A controller that evaluates the dynamics of its model with a backend.
 
     With `joint_dynamics` it knows the damping, dry friction, armature and springs of the description, as
-    quantities of backends do with the option of that name; by default it computes with rigid bodies. Dry
-    friction is overcome along the velocity of the setpoint, which moves joints that stick and cannot make
+    quantities of backends do with the option of that name. By default it computes with rigid bodies alone.
+    Dry friction is overcome along the velocity of the setpoint, which moves joints that stick and cannot make
     them unstable. It commands every coordinate, so a floating base, which has no motor, is refused.
     """
 

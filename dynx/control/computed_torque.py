@@ -76,9 +76,9 @@ class DiscreteComputedTorque(ModelBased[None], pure=True):
     An initial error is removed in one step, however large the torque, and velocities are the difference
     quotients of the reference.
 
-    It is exact if the control step equals the physics step and the plant has no joint dynamics, or those that
-    it knows with `joint_dynamics`: they act at the end of the step. With another plant (RK4, sub-steps) an
-    error of the order of dt remains.
+    It is exact if the control step equals the physics step, and if the plant has no joint dynamics or the
+    controller knows them (`joint_dynamics`). Joint dynamics act at the end of the step. With another plant
+    (RK4, sub-steps) an error of the order of dt remains.
     """
 
     control_dt: float = parameter("s")

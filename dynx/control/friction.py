@@ -20,10 +20,10 @@ SPEEDS = ("measured", "setpoint")
 class FrictionCompensation(Wrapper[ControllerState], pure=True):
     """Torque of another controller plus d v + f tanh(v / slip), where v is measured or that of the setpoint.
 
-    With the measured speed the friction of a moving plant is cancelled if the coefficients are those of the
-    plant, but noise or overestimated friction may make the joint unstable, and a joint that sticks gets no
-    compensation: its speed is 0. The speed of the setpoint cannot make it unstable, and moves a joint that
-    sticks: with it and ``slip=0`` the torque breaks a joint loose as soon as the setpoint moves.
+    With the measured speed, the friction of a moving plant is cancelled if the coefficients are those of the
+    plant. But noise or overestimated friction may make the joint unstable. A joint that sticks gets no
+    compensation, because its speed is 0. The speed of the setpoint cannot make the joint unstable, and moves
+    a joint that sticks. With ``slip=0`` the torque breaks a joint loose as soon as the setpoint moves.
     """
 
     damping: bool | Floats = parameter("N m s/rad or N s/m")

@@ -235,16 +235,16 @@ SCHEMES: dict[str, Callable[[Model, float], Any]] = {
 class RobotTask(Task):
     """A task of one robot without contacts, whose dynamics a backend of dynx evaluates.
 
-    The robot that moves has joint dynamics and limits of its description, unless options
-    of the environment switch them off; what the methods evaluate is that of rigid bodies, and
-    ``robot.joints`` has the coefficients.
+    The robot that moves has the joint dynamics and limits of its description, unless options of the
+    environment switch them off. The methods compute with rigid bodies alone, and ``robot.joints`` has the
+    coefficients.
 
     All methods are array code for one environment: they compute with NumPy's functions on arrays of floats,
     and in a vector environment on symbols, from which one kernel is compiled. So they must not branch on a
-    value (write ``np.where``) and must return the same for the same arguments: random numbers are those that
-    `start` receives, and a kernel refuses others with an ArgumentError. `robot` evaluates quantities
-    of the robot at a configuration: ``robot.forward_kinematics(q, frame)``, ``robot.bias_torque(q, v)`` and
-    the others of `dynx.backends.dynamics.Dynamics`.
+    value (write ``np.where``) and must return the same result for the same arguments. Use only the random
+    numbers that `start` receives. A kernel refuses other random numbers with an ArgumentError. `robot`
+    evaluates quantities of the robot at a configuration: ``robot.forward_kinematics(q, frame)``,
+    ``robot.bias_torque(q, v)`` and the others of `dynx.backends.dynamics.Dynamics`.
     """
 
     substeps: ClassVar[int] = 1
@@ -400,9 +400,9 @@ class Episode:
 class WorldTask(Task):
     """A task in a scene with contacts, which an engine steps through `dynx.world.World`.
 
-    The order of calls: `start` sets the state of an episode and its memory. Then for each action `loads`
-    says what acts, the world takes a step of `control_dt`, `settle` updates the memory, and `observation`,
-    `reward`, `terminated` and `info` read the world and the memory.
+    The order of calls: `start` sets the state of an episode and its memory. Then, for each action, `loads`
+    returns the torques, motors and forces, the world takes a step of `control_dt`, and `settle` updates the
+    memory. Then `observation`, `reward`, `terminated` and `info` read the world and the memory.
     """
 
     substeps: ClassVar[int] = 1

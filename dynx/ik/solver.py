@@ -71,8 +71,9 @@ def inverse_kinematics(
     a list of `FrameTarget`, each with options of its own; `frame` is None then.
 
     `dynx.ik.options.Options` describes each option, with its unit. With `free`, `weights` or tolerances along
-    axes a target need not be reached in every direction: ``free="rotation_z"`` leaves the rotation about the
-    target's z axis free (a welding torch), ``free=("position_x", "rotation")`` the position on a line.
+    axes a target need not be reached in every direction. ``free="rotation_z"`` leaves the rotation about the
+    target's z axis free (a welding torch). ``free=("position_x", "rotation")`` leaves the position on a line
+    free, with any rotation.
 
     The search starts at `q0` (..., nq), moved into the limits (`IKResult.note` says so), or at a random
     configuration if q0 is None. Targets and q0 broadcast. A start is abandoned after `max_iterations` steps,
@@ -83,10 +84,10 @@ def inverse_kinematics(
     Only the joints between root and frames move, and a floating base; the others stay at q0 (or at the
     neutral configuration). Angles whose range is a full turn are returned nearest to q0.
 
-    The result is checked by forward kinematics. If a target is not reached, no error is raised: the result
-    has the best q found, and the status UNREACHABLE if it is farther than the chain is long, so that no
-    configuration reaches it (`dynx.ik.reach`), TIMED_OUT if `timeout` [s] stopped the search, otherwise
-    NOT_FOUND. Samples of a batch that were not begun then have the start as q and NaN as errors.
+    The result is checked by forward kinematics. If a target is not reached, no error is raised, and the
+    result has the best q found. The status is UNREACHABLE if the target is farther than the chain is long, so
+    that no configuration reaches it (`dynx.ik.reach`). It is TIMED_OUT if `timeout` [s] stopped the search,
+    otherwise NOT_FOUND. Samples of a batch that were not begun then have the start as q and NaN as errors.
 
     With `avoid`, a scene or what `Scene.avoidance` returns, a solution keeps the robot's links at least a
     margin from the obstacles and from one another, by certified distances (`dynx.distance`). Solutions that
@@ -95,11 +96,11 @@ def inverse_kinematics(
     pair.
 
     With ``all_solutions=True`` the result is an `IKSolutions` with every configuration within limits that
-    reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). It exists
-    for six revolute joints with a spherical wrist or three parallel axes, and for many arms with prismatic
-    joints; `given` holds positions [rad or m] of further joints between root and frame, such as one of seven.
-    Angles are those nearest to q0, or to 0; `IKSolutions.with_full_turns` lists the others within the limits.
-    The options of the search have no effect then.
+    reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). It exists for
+    six revolute joints with a spherical wrist or three parallel axes, and for many arms with prismatic
+    joints. `given` holds positions [rad or m] of further joints between root and frame, such as one joint of
+    seven. Angles are those nearest to q0, or to 0; `IKSolutions.with_full_turns` lists the others within the
+    limits. The options of the search have no effect then.
 
     Raises UnknownNameError for the frame or the name of an option; ArgumentError (ShapeError, DTypeError,
     NotFiniteError) for an invalid argument, and for method ``"engine"`` if the backend has no solver of its

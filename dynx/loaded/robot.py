@@ -24,9 +24,9 @@ Bounds = tuple[float, float]
 class LoadedInertial:
     """The inertia that an engine holds for a link, with that of the links merged into it.
 
-    `mass` is in kg, `center` (3,) [m] is the centre of mass in the link frame, `inertia` (3, 3) [kg m^2] the
-    tensor about it in the axes of the link frame. `merged` names the other links whose inertia is included,
-    because the engine merges links that fixed joints connect.
+    `mass` is in kg, and `center` (3,) [m] is the centre of mass in the link frame. `inertia` (3, 3) [kg m^2]
+    is the tensor about the centre of mass, in the axes of the link frame. `merged` names the other links
+    whose inertia is included, because the engine merges links that fixed joints connect.
     """
 
     mass: float
@@ -39,8 +39,8 @@ class LoadedInertial:
 class LoadedJoint:
     """The properties that an engine holds for a joint that moves; None where it reports none.
 
-    `placement` (4, 4) is the pose of the joint frame at value 0 in the frame of the URDF parent link,
-    `axis` (3,) the axis in the joint frame, as the engine holds it (its length may not be 1).
+    `placement` (4, 4) is the pose of the joint frame at value 0 in the frame of the URDF parent link. `axis`
+    (3,) is the engine's axis in the joint frame; its length need not be 1.
     """
 
     type: str
@@ -160,9 +160,9 @@ class LoadedRobot(ABC):
     def contacts(self, q: Floats) -> Mapping[tuple[str, str], float]:
         """Return the pairs of shapes whose contact adds forces, each with the depth [m] of the penetration.
 
-        A shape is known by its name in the document; one without a name by the link in which the engine has
-        it, which may be one that others are merged into. Empty in an engine whose equations of motion have no
-        contacts.
+        A shape is identified by its name in the document. A shape without a name is identified by the link in
+        which the engine has it, which may be a link that others are merged into. Empty in an engine whose
+        equations of motion have no contacts.
         """
         return {}
 

@@ -75,8 +75,8 @@ def random(
     """Sample configurations (*size, nq) uniformly within the limits.
 
     An angle without limits is in (-pi, pi), a length in (-1, 1). A floating base gets a position in the cube
-    [-1, 1]^3 and a uniformly distributed orientation (Shoemake 1992), a ball joint an orientation uniformly
-    distributed among those within its largest angle. `rng` is a NumPy generator or a seed.
+    [-1, 1]^3 and a uniformly distributed orientation (Shoemake 1992). A ball joint gets an orientation
+    uniformly distributed within its largest angle. `rng` is a NumPy generator or a seed.
     """
     rng = checked_generator(rng)
     shape = checked_size(size)

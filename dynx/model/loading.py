@@ -61,8 +61,8 @@ def load(
     `base` is ``"fixed"`` (default) or ``"floating"``; MJCF and SDF state their own, and the gravity. `lock`
     fixes joints, by name, at positions [rad or m]; they are removed from q. `gravity` is (3,) [m/s^2] in
     world axes, by default (0, 0, -9.81). `base_pose` is the pose of the root link of a fixed base in the
-    world, a `Pose`, a matrix (4, 4) or a pair of position and quaternion (x, y, z, w), by default the
-    identity. Packages and meshes are searched in the folders `package_dirs` and around the file.
+    world, by default the identity. It is a `Pose`, a matrix (4, 4) or a pair of position and quaternion (x,
+    y, z, w). Packages and meshes are searched in the folders `package_dirs` and around the file.
 
     Raises RobotNotFoundError if no robot or file is found, DescriptionError if the description is malformed
     (with file and line), UnsupportedFeatureError if it uses a feature that dynx does not support,

@@ -30,11 +30,11 @@ class Model(Tree):
 
     Create one with `dynx.load` or `Model.build`. Coordinates (`q`, `v`) list the moving joints in the order
     of `joint_names`: depth-first from the root, children in the order of the document. With a floating base,
-    ``q[:3]`` is the position of the base frame in the world [m], ``q[3:7]`` its unit quaternion (x, y, z, w),
-    and ``v[:3]``, ``v[3:6]`` its linear [m/s] and angular [rad/s] velocity, both expressed in the base frame.
-    A ball joint has a unit quaternion (x, y, z, w) in q, the attitude of its child in the joint's frame, and
-    in v the angular velocity of the child relative to the parent, in the axes of the child. A fixed base has
-    the pose `base_pose` in the world.
+    ``q[:3]`` is the position of the base frame in the world [m], and ``q[3:7]`` its unit quaternion (x, y, z,
+    w). ``v[:3]`` and ``v[3:6]`` are its linear [m/s] and angular [rad/s] velocity, both expressed in the base
+    frame. A ball joint has a unit quaternion (x, y, z, w) in q, the attitude of its child in the joint's
+    frame. In v it has the angular velocity of the child relative to the parent, in the axes of the child. A
+    fixed base has the pose `base_pose` in the world.
 
     `geometry` holds the visual and collision shapes of the links, `contact_filter` which of them may touch,
     `actuators` what drives the joints. They affect no dynamics without contacts and commands, so models that

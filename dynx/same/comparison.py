@@ -99,12 +99,12 @@ def same_robot(
     `a` and `b` are what `dynx.load` takes: files, text, names, models, in any of its formats. `base` is that
     of both; by default a URDF file has the base that the other description states, or a fixed one.
 
-    Links are merged across fixed joints; what remains of a robot are the lines of its joint axes at the zero
-    positions, and the base inertial parameters of its bodies (Gautier and Khalil 1990). Frames of links, the
-    signs of axes, and inertia that no state shows may differ (`SameReport.freedoms`). The robots are the same
-    if all else differs by at most `tolerance` of its scale: the reach of the robot for lengths, 1 rad for
-    angles, the body's own inertia for inertias. dynx computes differences in 50 digits from the decimals of
-    the files. If the robots differ, the report has the fewest elements of `b` to replace, and `b` mended.
+    dynx merges links across fixed joints. It compares the lines of the joint axes at the zero positions, and
+    the base inertial parameters of the bodies (Gautier and Khalil 1990). Frames of links, the signs of axes,
+    and inertia that no state shows may differ (`SameReport.freedoms`). The robots are the same if all else
+    differs by at most `tolerance` of its scale: the reach of the robot for lengths, 1 rad for angles, the
+    body's own inertia for inertias. dynx computes differences in 50 digits from the decimals of the files. If
+    the robots differ, the report has the fewest elements of `b` to replace, and `b` mended.
 
     Raises the errors of `dynx.load`; ArgumentError for a `tolerance` that is no number from 0 to below 1.
     """

@@ -562,16 +562,16 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
     payload or scaled masses, `parametric` has to be made from ``plant_model(model, payload, mass_scale)``.
     With `record_every` = k every k-th state is recorded.
 
-    The first argument may also be a robot's name or file, or a `Scenario` on the plant ``compiled``; beside
-    a scenario only arguments that may differ between rollouts can be given. `BatchRollouts.scenario` is the
-    scenario that all rollouts share.
+    The first argument may also be a robot's name or file, or a `Scenario` on the plant ``compiled``. Together
+    with a scenario you can give only arguments that may differ between rollouts. `BatchRollouts.scenario` is
+    the scenario that all rollouts share.
 
     The batch is divided into parts, which run on `threads` threads (None: one per processor) or in any
-    `concurrent.futures` `executor`, such as one of processes or of a cluster; results are the same bit for
-    bit. `keep` is a folder in which each finished part is stored; a run that is started again with the same
-    arguments continues from there. A part that cannot be stored, for example because the disk is full, is
-    still in the result, and a RuntimeWarning names the reason. Ctrl-C raises BatchInterrupted, which has the
-    finished rollouts. `progress` is called after each part.
+    `concurrent.futures` `executor`, such as one of processes or of a cluster. The results are the same bit
+    for bit. `keep` is a folder in which each finished part is stored; a run that is started again with the
+    same arguments continues from there. A part that cannot be stored, for example because the disk is full,
+    is still in the result, and a RuntimeWarning names the reason. Ctrl-C raises BatchInterrupted, which has
+    the finished rollouts. `progress` is called after each part.
 
     Raises ArgumentError, GainError, LimitError, SingularMassMatrixError as `simulate` does, and
     UnsupportedFeatureError for controllers that branch on their measurement. A rollout that diverges does not

@@ -37,10 +37,10 @@ class BatchRollouts:
     Errors are `model.difference` from the configuration at the end of each step to the reference there. The
     record has the states after every `record_every` steps, and the torque of the step before.
 
-    `diverged` is the time [s] at which the step begins that leads to a velocity that is not finite or whose
-    norm is above 1e8 rad/s or m/s: the `time` of the error that `simulate` raises there. It is a multiple of
-    `dt`, and NaN for rollouts that did not diverge. A diverged rollout counts as done: it takes the remaining
-    steps, and its states and errors are in general not finite.
+    `diverged` is the time [s] at which a step begins, after which the velocity is not finite or has a norm
+    above 1e8 rad/s or m/s. `simulate` raises an error with this `time`. It is a multiple of `dt`, and NaN for
+    rollouts that did not diverge. A diverged rollout counts as done: it takes the remaining steps, and its
+    states and errors are in general not finite.
     """
 
     scenario: Scenario  # shared by all rollouts, without the arguments that have a row for each rollout

@@ -161,8 +161,8 @@ class Simulation:
     def step(self, n: int = 1, tau: ArrayLike | None = None) -> SimulationState:
         """Take `n` steps of `dt`, and return the state after them.
 
-        `tau` (nv,) [N m or N] replaces the torque of the controller, which is not evaluated in these steps;
-        effort limits apply to it, and it is held until the next control step. Raises DivergedError and
+        `tau` (nv,) [N m or N] replaces the torque of the controller, which is not evaluated in these steps.
+        Effort limits apply to `tau`, and it is held until the next control step. Raises DivergedError and
         ControlError, with the record so far in ``error.rollout``.
         """
         n = step_count(n, "run(until) takes the time")
@@ -621,20 +621,21 @@ class SimulateArguments(ScenarioArguments):
 def simulate(given: SimulateArguments) -> Rollout:
     """Simulate `model` under `controller` along `reference`, and return the record.
 
-    The first argument may also be a robot's name or file, which `dynx.load` reads, or a `Scenario`, whose
-    fields are the other arguments except `resume`, `step` and `progress`; beside it only those can be given.
+    The first argument may also be a robot's name or file, which `dynx.load` reads, or a `Scenario`. The
+    fields of a scenario are the other arguments. Together with a scenario you can give only `resume`, `step`
+    and `progress`.
 
     The plant and the controller can use different engines (``controller_backend`` replaces the controller's
     own), so that the effect of an error in one of them can be studied.
 
     **Plant.** ``plant="pybullet"`` is PyBullet's own stepper; with ``integrator="engine"`` MuJoCo and Drake
-    are theirs. Any other name is a backend whose forward dynamics an `integrator` of dynx integrates:
-    ``semi_implicit`` (the default: v then q, the scheme of Bullet), ``rk4``, or ``adaptive`` (SciPy's
-    `method` with `rtol`, `atol`). ``plant="pybullet", integrator="rk4"`` is PyBullet's forward dynamics under
-    RK4. Without a controller (None) the robot has no motors. A `ScenePlant` is the robot in a scene, with
-    contacts; the rollout then has `surroundings`. `reference` is a trajectory, one configuration (nq,) to
-    hold, or None. The initial state is `q0`, `v0`; by default that of the scene, the start of the reference,
-    or the neutral configuration.
+    are theirs. Any other name is a backend whose forward dynamics an `integrator` of dynx integrates.
+    Integrators are ``semi_implicit`` (the default: v then q, the scheme of Bullet), ``rk4``, and ``adaptive``
+    (SciPy's `method` with `rtol`, `atol`). ``plant="pybullet", integrator="rk4"`` is PyBullet's forward
+    dynamics under RK4. Without a controller (None) the robot has no motors. A `ScenePlant` is the robot in a
+    scene, with contacts; the rollout then has `surroundings`. `reference` is a trajectory, one configuration
+    (nq,) to hold, or None. The initial state is `q0`, `v0`; by default that of the scene, the start of the
+    reference, or the neutral configuration.
 
     **Time** [s]. `dt` is the step of the record; the plant takes `substeps` steps in each. The controller
     runs every `control_dt` (by default `dt`), and its torque is held in between. It measures the state as it
@@ -642,26 +643,28 @@ def simulate(given: SimulateArguments) -> Rollout:
     multiples of `dt`. The default `duration` is that of the reference. It is rounded up to a multiple of
     `dt`; a reference that has ended before is held at its end.
 
-    **Joints**, the same in every plant: `joint_damping`, dry `joint_friction` and `joint_armature`, each True
-    for those of the description (the default, as in a world), False for none, one number, one for each joint,
-    or numbers by joint, ``{"elbow_joint": 0.5}``, where joints that are not named have none. Dry friction
-    holds a joint at rest up to its magnitude and opposes the motion beyond (`dynx.rbd.joint_friction`), at
-    any step; with `friction_slip` [rad/s or m/s] above 0 it is smoothed over that speed instead, so that
-    loaded joints creep (`JointFriction`). `effort_limits`, True for the model's, saturate torques and are
-    recorded. With `joint_limits` joints stop at the limits of the description: inelastically
-    (`dynx.steppers.joint_stops`), in a scene by the engine's own law. `pushes` are external wrenches.
+    **Joints**, the same in every plant: `joint_damping`, dry `joint_friction` and `joint_armature`. Each is
+    True for the values of the description (the default, as in a world), False for none, one number, or one
+    number for each joint. With numbers by joint, ``{"elbow_joint": 0.5}``, joints that are not named have
+    none. Dry friction holds a joint at rest up to its magnitude and opposes the motion beyond
+    (`dynx.rbd.joint_friction`), at any step. With `friction_slip` [rad/s or m/s] above 0 it is smoothed over
+    that speed instead, so loaded joints creep (`JointFriction`). `effort_limits`, True for the model's,
+    saturate torques and are recorded. With `joint_limits` joints stop at the limits of the description:
+    inelastically (`dynx.steppers.joint_stops`), in a scene by the engine's own law. `pushes` are external
+    wrenches.
 
     **Model error.** The plant has a `payload` and masses scaled by `mass_scale` (all links, or some) that the
     controller does not know; `noise` is added to the measurements. `sensors` and those of a scene are read
     after the simulation (`Rollout.sensors`); controllers do not use them.
 
-    **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record and the
-    rest is computed, with the same result as one run, to the last bit. The record's scenario must be equal to
-    this one in every field but `duration`. The controller must have no state but the one that it returns.
+    **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record, and the
+    rest is computed. The result equals that of one run, to the last bit. The record's scenario must be equal
+    to this one in every field but `duration`. The controller must have no state but the one that it returns.
 
     **Long runs.** `progress` is called regularly with the number of steps taken and the total number. Ctrl-C
-    raises RolloutInterrupted, which has the record until then in ``.rollout`` and can be resumed; before the
-    simulation is set up (setpoints, plant) there is none, and it stays Python's KeyboardInterrupt.
+    raises RolloutInterrupted, which has the record until then in ``.rollout``, from which you can resume.
+    Before the simulation is set up (setpoints, plant) there is no record, and Ctrl-C raises Python's
+    KeyboardInterrupt.
 
     Raises ArgumentError for a scenario that cannot be simulated, or that differs from the scenario of the
     record to resume; LimitError for a reference outside the limits of position and velocity (unless

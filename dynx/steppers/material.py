@@ -23,8 +23,8 @@ COEFFICIENTS = ("friction", "torsional_friction", "rolling_friction", "restituti
 class Material:
     """Coefficients of contact of a surface, and the colour of a body.
 
-    `friction` is Coulomb's coefficient; `torsional_friction` [m] opposes spinning about the normal and
-    `rolling_friction` [m] opposes rolling, each as a moment per normal force; `restitution` is the ratio of
+    `friction` is Coulomb's coefficient. `torsional_friction` [m] opposes spinning about the normal and
+    `rolling_friction` [m] opposes rolling, each as a moment per normal force. `restitution` is the ratio of
     the normal speeds after and before an impact. Two surfaces in contact have the geometric mean of their
     coefficients (`contact_material`), on every engine.
     """

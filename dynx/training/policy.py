@@ -182,8 +182,8 @@ def load_policy(
     them, has the likeliest action alone and differs by rounding in single precision. By default it is
     PyTorch where stable-baselines3 is installed, else NumPy.
 
-    Only tensors and JSON are read from the file, so that it runs no code and opens no other file: it names a
-    registered task, with options that are numbers, words and robots. A task of your own, an id
+    dynx reads only tensors and JSON from the file, so loading it runs no code and opens no other file. The
+    file names a registered task, with options that are numbers, words and robots. A task of your own, an id
     ``module:Env-v0`` and options that name a file are given as `task`, which is also the task of the policy
     then. Raises ArgumentError for a file that is no policy, is damaged, or has a policy for other
     observations or actions, and for networks that NumPy does not compute.

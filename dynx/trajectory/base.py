@@ -31,9 +31,9 @@ class Setpoint(NamedTuple):
 class Trajectory(ABC):
     """A motion over ``0 <= t <= duration`` [s]: ``trajectory(t)`` returns its `Setpoint`.
 
-    `v` and `a` are velocity and acceleration as in all of dynx: rates of the joints and, with a floating
-    base, linear and angular velocity of the base frame in its own axes, and their time derivatives. Where `a`
-    jumps, its value is that after the jump; at ``duration``, that before it.
+    `v` and `a` are velocity and acceleration as in all of dynx. `v` has the velocities of the joints and,
+    with a floating base, the linear and angular velocity of the base frame in its own axes. `a` has their
+    time derivatives. Where `a` jumps, its value is that after the jump; at ``duration``, that before it.
 
     Before 0 and after `duration` the robot is at rest at `start.q` and `end.q`. At these two times the
     setpoint is exactly `start` or `end`, without rounding. Trajectories are immutable and can be pickled;

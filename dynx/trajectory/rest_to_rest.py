@@ -51,9 +51,9 @@ def trapezoidal(
     """Return a motion from rest at `q0` to rest at `q1` with a trapezoidal velocity profile.
 
     `velocity` and `acceleration` are limits, one number or (nv,); infinity means no limit. The default of
-    `velocity` is the limit of the `model`. The motion is the fastest on the straight line, so that some joint
-    is at a limit at any time, or it takes `duration` [s] if that is longer (time is then scaled uniformly). A
-    floating base needs the `model` and moves along one screw axis.
+    `velocity` is the limit of the `model`. The motion is the fastest on the straight line, so some joint is
+    at a limit at any time. If `duration` [s] is longer, the motion takes this time, and time is scaled
+    uniformly. A floating base needs the `model` and moves along one screw axis.
 
     Raises ArgumentError for limits that are negative, or infinite for every moving joint; TrajectoryError for
     a limit of 0 of a joint that has to move, and for a duration that is too short.

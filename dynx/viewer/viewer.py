@@ -415,9 +415,9 @@ class Viewer(Controls):
         """Let the camera of every page move with a part: a link of a robot, or in a motion or a world a body
         or ``robot/link``. A robot's name stands for its root link. With None the camera stays where it is.
 
-        The page keeps its view of the part until its user turns, zooms or shifts it. With `first_person` it
-        looks along the x axis of the part, with its z axis up, from where that axis leaves the shapes of the
-        part and of what is fixed to it. Raises ArgumentError for an unknown part.
+        The page keeps its view of the part until its user turns, zooms or shifts it. With `first_person` the
+        camera looks along the x axis of the part, with its z axis up. It stands where this axis leaves the
+        shapes of the part and of the links fixed to it. Raises ArgumentError for an unknown part.
         """
         self.page.check_open()
         self.view.camera.follow(part, first_person=first_person)
@@ -674,10 +674,9 @@ class Viewer(Controls):
         """Record what the page shows in a ``with`` block as a film, which is drawn at its end without a
         browser: ``.gif``, or ``.mp4`` (extra ``film``).
 
-        A film of a live world plays in the time of the world, any other in that of the clock; it lasts as
-        long, with about 12.5 pictures a second, and ends after 40 s. Raises ArgumentError for another
-        suffix and for a file that cannot be written, and NotInstalledError without the package that writes
-        the film.
+        A film of a live world plays in the time of the world, any other film in the time of the clock. A film
+        has about 12.5 pictures a second, and ends after 40 s. Raises ArgumentError for another suffix and for
+        a file that cannot be written, and NotInstalledError without the package that writes the film.
         """
         from dynx.viewer.recording import recorded_film
 

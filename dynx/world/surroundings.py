@@ -25,7 +25,8 @@ class ContactTable:
     """All contacts of a rollout, a row each, in the order of the steps.
 
     Row k is a contact between ``names[a[k]]`` and ``names[b[k]]`` during step ``step[k]``, which begins at
-    ``t[step[k]]``, in the last of its sub-steps; all else is as in `dynx.world.Contact`, in world axes.
+    ``t[step[k]]``, in the last of its sub-steps. The other arrays are as in `dynx.world.Contact`, in world
+    axes.
     """
 
     n_steps: int

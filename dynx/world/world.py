@@ -673,9 +673,9 @@ class World:
     def closest_points(
         self, a: str, b: str, within: float = 1.0, *, native: bool = False
     ) -> tuple[ClosestPoints, ...]:
-        """Return the nearest points of two parts (a body, ``robot/link``, a robot), nearest first: one entry
-        for each pair of their links at most `within` [m] apart, by `dynx.distance` or, if `native`, by the
-        engine."""
+        """Return the nearest points of two parts (a body, ``robot/link``, a robot), nearest first. There is
+        one entry for each pair of their links at most `within` [m] apart, by `dynx.distance` or, if `native`,
+        by the engine."""
         return self._queries.closest_points(self._motion.engine, self.state, a, b, within, native)
 
     @cached_property

@@ -90,8 +90,8 @@ class IKSolutions(IKResult):
     """All configurations that reach a pose.
 
     For one pose, q (k, nq) holds the k solutions, and `branches` their names; k may be 0. For a batch of
-    poses (...), q (..., 8, nq) has one row for each branch; `success` (..., 8) says which rows are solutions,
-    and rows that are none hold the initial configuration (`q0`).
+    poses (...), q (..., 8, nq) has eight rows. `success` (..., 8) is True for rows that are solutions. The
+    other rows hold the initial configuration (`q0`).
 
     What is not asked for is not computed: a pose takes a few microseconds.
     """

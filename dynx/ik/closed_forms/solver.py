@@ -139,12 +139,12 @@ class ClosedForm:
         limits are included. If the form is compiled, a batch is split over at most `threads` threads, with
         the same results for any number.
 
-        Every solution reaches its pose within `review.ACCURACY`. At a singular pose, where infinitely many
-        configurations do, one stands for them (`IKSolutions.arbitrary`): its arbitrary angle is the one
-        nearest to 0 within the limits, or for three parallel axes, if that puts the pose out of reach, the
-        nearest within reach. Where the axes meet or are parallel only to `tolerance`, solutions may be missed
-        that close to a singularity or to the edge of the workspace, and where a quartic is solved within some
-        1e-6 rad of a singularity.
+        Every solution reaches its pose within `review.ACCURACY`. Infinitely many configurations reach a
+        singular pose, and one stands for them (`IKSolutions.arbitrary`). Its arbitrary angle is the angle
+        nearest to 0 within the limits. For three parallel axes this angle may put the pose out of reach; then
+        it is the nearest angle within reach. If the axes meet or are parallel only to `tolerance`, solutions
+        may be missed within this distance of a singularity or of the edge of the workspace. If a quartic is
+        solved, solutions may be missed within some 1e-6 rad of a singularity.
 
         Raises ShapeError, DTypeError, NotFiniteError or ArgumentError for an invalid target or q0.
         """
@@ -277,8 +277,8 @@ def closed_form(
 ) -> ClosedForm:
     """Return the closed form of the inverse kinematics of a frame.
 
-    It exists for six revolute joints between world and frame of which the last (or the first) three axes meet
-    in a point, or of which three that follow each other are parallel; for a spherical wrist on an arm with
+    It exists for six revolute joints between world and frame if the last (or the first) three axes meet in a
+    point, or if three successive axes are parallel. It also exists for a spherical wrist on an arm with
     prismatic joints, for three prismatic and up to three revolute joints, and for SCARA arms. `given` holds
     the positions [rad or m] of further joints between world and frame, such as one of seven.
 

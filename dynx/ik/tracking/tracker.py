@@ -177,32 +177,32 @@ def track(
     """Follow a path of targets by a continuous sequence of configurations within limits.
 
     `targets` are n poses T_world_target (..., n, 4, 4), n positions (..., n, 3) [m] whose rotation is free,
-    or with ``free="position"`` n rotations (..., n, 3, 3); `free` (also single axes
-    of poses, such as ``"rotation_z"`` of a welding torch) and `point` (3,) [m] are those of
-    `inverse_kinematics`. Leading axes are paths of their own. `targets` may also be a motion of this robot,
-    such as a `dynx.trajectory.Trajectory`, whose poses of `frame` are taken every `dt` [s].
+    or with ``free="position"`` n rotations (..., n, 3, 3). `free` (also single axes of poses, such as
+    ``"rotation_z"`` of a welding torch) and `point` (3,) [m] are as in `inverse_kinematics`. Leading axes are
+    paths of their own. `targets` may also be a motion of this robot, such as a `dynx.trajectory.Trajectory`,
+    whose poses of `frame` are taken every `dt` [s].
 
     `q0` (..., nq) is the configuration before the first sample, moved into the limits (`TrackResult.note`
-    says so): a path may be tracked in pieces, each from the last q of the piece before. Without q0 the start
-    is chosen: of up to `max_starts` configurations that reach the first target, the one farthest from
-    position limits from which the whole path is OK; if there is none, the one from which the path is OK
-    longest.
+    says so). So you can track a path in pieces, each from the last q of the piece before. Without q0, `track`
+    chooses the start among up to `max_starts` configurations that reach the first target. It takes the one
+    farthest from position limits from which the whole path is OK. If there is none, it takes the one from
+    which the path is OK longest.
 
     With `dt` [s], the time between two samples, no coordinate moves faster than `velocity_limit` (one number
-    or (nv,) [rad/s or m/s], by default the model's limits), and samples that would need more are LIMITED. The
-    position limits are kept with `limit_margin` [rad or m], one number or (nq,).
+    or (nv,) [rad/s or m/s], by default the model's limits). Samples that would need a higher velocity are
+    LIMITED. The position limits are kept with `limit_margin` [rad or m], one number or (nq,).
 
-    A sample counts as reached within `position_tolerance` [m] and `rotation_tolerance` [rad]. It is
+    A sample counts as reached within `position_tolerance` [m] and `rotation_tolerance` [rad]. A sample is
     continuous with the one before if a descent from there reaches it and moves no coordinate by more than
-    `max_step` [rad or m], or if that holds between up to 64 poses on the straight way to it. Where no
-    continuous configuration reaches the target, q jumps to the nearest of the solutions found from
-    `max_starts` random starts and the status is JUMPED; without one, or with ``jumps=False`` (the
-    default with `dt`), q is the configuration with the least error that is continuous, and LIMITED or HELD
-    names the cause. Equal calls with a seed `rng` return equal results.
+    `max_step` [rad or m]. It is also continuous if that holds between up to 64 poses on the straight line to
+    it. If no continuous configuration reaches the target, q jumps to the nearest of the solutions found from
+    `max_starts` random starts, and the status is JUMPED. If there is no such solution, or with
+    ``jumps=False`` (the default with `dt`), q is the continuous configuration with the least error. The
+    status LIMITED or HELD names the cause. Equal calls with a seed `rng` return equal results.
 
-    With `avoid`, a scene or what `Scene.avoidance` returns, samples that are OK or JUMPED keep bodies apart
-    (not the ways between them): redundant joints move around what is in the way, and where no continuous
-    configuration is clear the path jumps, or the sample is HELD at one that is clear.
+    With `avoid`, a scene or the result of `Scene.avoidance`, samples that are OK or JUMPED keep bodies apart.
+    The motion between two samples is not checked. Redundant joints move around bodies that are in the way. If
+    no continuous configuration is clear, the path jumps, or the sample is HELD at a clear configuration.
 
     With `timeout` [s] the search ends after that time, to within 10 %: samples that are not reached then are
     TIMED_OUT. Compiling or loading the kernels of a robot, once, does not count.

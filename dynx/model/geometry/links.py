@@ -86,9 +86,9 @@ ShapeNumber = tuple[str, int]
 class ContactFilter:
     """Which collision shapes of a robot may touch, as MJCF states it. It is data: scenes have their own.
 
-    Two shapes may touch if contype of one and conaffinity of the other share a bit, unless their links are
-    `excluded`, rigidly connected, or on both sides of one joint of which neither is fixed in the world.
-    Shapes that are `paired` may touch in any case.
+    Two shapes may touch if contype of one and conaffinity of the other share a bit. They do not touch if
+    their links are `excluded` or rigidly connected, or if one joint connects the links and neither is fixed
+    in the world. Shapes that are `paired` may touch in any case.
     """
 
     bits: Mapping[str, tuple[tuple[int, int], ...]]
@@ -121,8 +121,8 @@ Links = Mapping[str, LinkGeometry]
 class Geometry:
     """The shapes of every link of a robot, by the name of the link.
 
-    Those of a description are read when the first is asked for; a fault in a shape is raised where the shapes
-    of that kind of its link are asked for, not by `dynx.load`.
+    dynx reads the shapes of a description at their first use. A fault in a shape raises an error at the first
+    use of the shapes of that kind of its link, not in `dynx.load`.
     """
 
     def __init__(self, links: Links | Callable[[], Links]) -> None:

@@ -122,8 +122,9 @@ class Summary(NamedTuple):
 class Rollout:
     """n steps of a robot in motion: states at n + 1 times, and torques and accelerations between them.
 
-    Row k of `a`, `tau` and `saturated` belongs to the step from ``t[k]`` to ``t[k + 1]``: the torque that
-    acted on the plant, the acceleration as the step begins, and whether each motor was at its limit.
+    Row k of `a`, `tau` and `saturated` belongs to the step from ``t[k]`` to ``t[k + 1]``. `a` is the
+    acceleration at the start of the step, `tau` the torque that acted on the plant. `saturated` states
+    whether each motor was at its limit.
     """
 
     model: Model
@@ -358,9 +359,9 @@ class Rollout:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what is hardly meant: joints that start beyond their limits, which stop them, or far
-        beyond, springs too stiff for the step, gravity that points up; in a scene also those of its world at
-        the start (`dynx.world.World.notes`)."""
+        """Sentences on doubtful input: joints that start beyond their limits, springs too stiff for the step,
+        gravity that points up. In a scene they include the notes of its world at the start
+        (`dynx.world.World.notes`)."""
         # Imported here, because `simulate` needs it no more than other programs.
         from dynx.model.unlikely_inputs import gravity_notes, position_notes
 

@@ -100,9 +100,9 @@ class Scenario(SimulationOptions):
     record contains.
 
     The fields are the arguments of `dynx.simulate`, which documents them. Two scenarios are equal if all
-    fields are, element by element, with the defaults filled in; joint dynamics and limits that a description
-    does not have are those that are switched off. ``dataclasses.replace`` changes one field;
-    `to_json` and `from_json` keep every bit. Types are checked here, values when a simulation is made of it.
+    fields are equal, element by element, with the defaults filled in. Joint dynamics and limits that a
+    description does not have count as switched off. ``dataclasses.replace`` changes one field; `to_json` and
+    `from_json` keep every bit. Types are checked here, values when a simulation is made of it.
     """
 
     model: Model

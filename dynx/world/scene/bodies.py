@@ -61,11 +61,11 @@ class BodyOptions(TypedDict, total=False):
 class SceneBody:
     """A rigid body of one shape, or of several placed ones (`Collision`), at `pose` in the world.
 
-    Without `mass` it is fixed in the world. `center_of_mass` (3,) [m] is in the body frame, and `inertia`
-    (3, 3) [kg m^2] about it in the axes of the body; each is that of shapes of one density where it is None
-    (overlaps count twice; a mesh counts as its convex hull). `twist` (6,) is the velocity at the start:
-    linear [m/s] of the origin of the body frame, angular [rad/s], in world axes. The body is drawn by its
-    `visuals`, which never collide, where it has some, and otherwise by its shapes.
+    Without `mass` it is fixed in the world. `center_of_mass` (3,) [m] is in the body frame, and `inertia` (3,
+    3) [kg m^2] about it in the axes of the body. If one is None, dynx computes it from the shapes at uniform
+    density (overlaps count twice; a mesh counts as its convex hull). `twist` (6,) is the velocity at the
+    start: linear [m/s] of the origin of the body frame, angular [rad/s], in world axes. The body is drawn by
+    its `visuals`, which never collide, where it has some, and otherwise by its shapes.
     """
 
     name: str

@@ -37,8 +37,8 @@ class Scene:
     """Everything that is in a world at the start, for every engine alike.
 
     A part is named by its body, its robot, or ``robot/link``. `ignored` are pairs of names that do not
-    collide, where a robot stands for all its links and a name in `groups` for all its members; a pair of one
-    name twice makes the parts behind it ignore one another. Gravity (3,) [m/s^2] is that of the scene, not of
+    collide. A robot stands for all its links, and a name in `groups` for all its members. A pair of one name
+    twice makes the parts of this name ignore one another. Gravity (3,) [m/s^2] is that of the scene, not of
     the models. `sensors` are read by `World.read_sensors`. `notes` say how a file was read that states more
     than a scene, such as one in MJCF.
     """

@@ -56,11 +56,12 @@ class PlacedSensor(Sensor):
 class ForceTorqueSensor(PlacedSensor):
     """A sensor of the wrench that a joint transmits, ``force`` [N] and ``torque`` [N m].
 
-    It is that which the parent exerts on the child, in the axes and about the origin of the sensor's frame:
-    so the sensor of an arm at rest reads a force upwards. `on` is a joint, fixed or moving, with `pose` in
-    the frame of its child link; or a frame of the robot, in which `pose` is and which lies on the child link
-    of the joint. On the root link of a robot with a fixed base it is the wrench of the foundation. Without
-    `weight`, what the weight of the links beyond the joint contributes in their present pose is subtracted.
+    It is the wrench that the parent exerts on the child, in the axes and about the origin of the sensor's
+    frame. So the sensor of an arm at rest reads a force upwards. `on` is a joint, fixed or moving, with
+    `pose` in the frame of its child link. Or `on` is a frame of the robot that lies on the child link of the
+    joint, with `pose` in this frame. On the root link of a robot with a fixed base it is the wrench of the
+    foundation. Without `weight`, what the weight of the links beyond the joint contributes in their present
+    pose is subtracted.
     """
 
     weight: bool = True
@@ -115,7 +116,7 @@ class Imu(PlacedSensor):
     """An inertial measurement unit: specific force ``acceleration`` [m/s^2] and ``angular_velocity`` [rad/s].
 
     Both are those of the sensor's frame, at `pose` in a frame of a robot or in that of a body, in its axes.
-    The specific force is the acceleration of the frame's origin minus gravity: at rest it is 9.81 m/s^2
+    The specific force is the acceleration of the frame's origin minus gravity. At rest it is 9.81 m/s^2
     upwards, in free fall 0 (Groves, Principles of GNSS, inertial and multisensor integrated navigation
     systems, 2013, eq. 2.76).
     """
