@@ -1,9 +1,10 @@
-"""Survey of URDF files: the doctor's report on each, and the engines that load a file which dynx refuses.
+"""Survey of robot files: the doctor's report on each, and the engines that load a file which dynx refuses.
 
     python -m benchmarks.surveys.files FOLDER_OR_LIST [--base fixed] [--engines a,b] [--jobs N]
         [--json OUT.jsonl] [--mended FOLDER] [--fix-tolerance 1e-9] [--seconds LIMIT]
 
-A list is a text file with one path per line. Each file is examined in a worker process with a time limit, so
+A list is a text file with one path per line. Files in MJCF and SDF state their base and are examined with
+that one. Each file is examined in a worker process with a time limit, so
 that an engine that crashes costs one file. One line of JSON per file and base is appended to ``--json``, and
 files that it already has are not examined again. ``--mended`` keeps the corrected files, mended as by
 ``dynx doctor --fix`` with ``--fix-tolerance``. ``python -m benchmarks.surveys.raw_agreement OUT.jsonl``
@@ -29,6 +30,7 @@ from dynx.engines.silence import silence
 from dynx.errors import DynxError
 from dynx.loaded import installed_engines
 from dynx.loaded.registry import loader_class
+from dynx.model.document_format import Format, format_of_root
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.workers import Workers
@@ -47,10 +49,11 @@ Entry = dict[str, Any]
 
 @dataclass(frozen=True)
 class Task:
-    """One file on one base; `mended` is the folder of corrected files, for `fix_tolerance` of `diagnose`."""
+    """One file on one base, None for that of the file; `mended` is the folder of corrected files, for
+    `fix_tolerance` of `diagnose`."""
 
     path: str
-    base: Base
+    base: Base | None
     engines: tuple[str, ...] | None = None
     mended: str | None = None
     fix_tolerance: float | None = None
@@ -79,7 +82,7 @@ def examine(task: Task) -> Entry:
         del entry[bulky]
     if task.mended and report.error is None:
         digest = hashlib.sha256(task.path.encode()).hexdigest()[:16]
-        where = Path(task.mended) / f"{task.base}-{digest}.urdf"
+        where = Path(task.mended) / f"{task.base or 'own'}-{digest}{Path(task.path).suffix}"
         text = report.mended if report.mended is not None else report.text
         where.write_text(text or "", encoding="utf-8")
         entry["mended"] = str(where)
@@ -126,7 +129,7 @@ def survey(
 ) -> list[Entry]:
     """Examine the files in worker processes; `results` keeps the entries of an interrupted run."""
     entries = read_entries(results) if results is not None and results.exists() else []
-    done = {(entry["path"], entry["base"]) for entry in entries}
+    done = {(entry["path"], base) for entry in entries for base in (entry["base"], None)}
     left = [task for task in tasks if (task.path, task.base) not in done]
     with Workers(examine, jobs, timeout=seconds) as workers:
         for count, outcome in enumerate(workers.run(left), 1):
@@ -145,7 +148,7 @@ def survey(
             if count % 50 == 0 or count == len(left):
                 print(f"{count} of {len(left)}", flush=True)
     wanted = {(task.path, task.base) for task in tasks}
-    return [entry for entry in entries if (entry["path"], entry["base"]) in wanted]
+    return [entry for entry in entries if {(entry["path"], base) for base in (entry["base"], None)} & wanted]
 
 
 def _loads(task: Task) -> dict[str, str | None]:
@@ -255,7 +258,19 @@ def make_tasks(
     if mended:
         Path(mended).mkdir(parents=True, exist_ok=True)
     chosen = tuple(engines.split(",")) if engines else None
-    return [Task(path, base, chosen, mended, fix_tolerance) for path in paths for base in bases]
+    return [
+        Task(path, base, chosen, mended, fix_tolerance)
+        for path in paths
+        for base in (bases if format_of_file(path) == "urdf" else [None])
+    ]
+
+
+def format_of_file(path: str) -> Format:
+    """Return the format of a file by the tag of its root; URDF where there is none."""
+    try:
+        return format_of_root(XmlSource(Path(path).read_bytes(), path).root.tag)
+    except DynxError:
+        return "urdf"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

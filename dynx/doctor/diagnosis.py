@@ -126,19 +126,20 @@ def _failure(error: DynxError) -> LoadFailure:
 def with_meshes(report: DoctorReport, source: XmlSource) -> DoctorReport:
     """Add the mesh files that the description names and that were not read.
 
-    Of MJCF and SDF the reader refuses those on which a mass depends, and no other is needed.
+    Of MJCF and SDF the reader refuses those on which a mass depends. No other is needed; where one of SDF is
+    missing, an engine may refuse the file.
     """
-    if report.format != "urdf":
+    if report.format == "mjcf":
         return report
     named = list(named_meshes(source))
     parts = parts_with_meshes(source)
     kinds = {each.engine: loader_class(each.engine) for each in report.engines}
     unread = []
-    for link, mesh in named:
-        file = mesh.attributes["filename"]
-        reason = reason_unread(file, source.source)
+    for link, mesh, file in named:
+        found = is_found(file, source.source)
+        reason = None if found and report.format == "sdf" else reason_unread(file, source.source)
         if reason is not None:
-            lacking = set() if is_found(file, source.source) else parts[file]
+            lacking = set() if found else parts[file]
             above = is_found_above(file, source.source)
             refusing = tuple(
                 name

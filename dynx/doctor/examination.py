@@ -31,7 +31,16 @@ from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Detection, Rule
 from dynx.rules.case import Case
-from dynx.rules.geometry import bullet_box, collision_meshes, has_shape, may_be_refused, texture_replacements
+from dynx.rules.geometry import (
+    bullet_box,
+    collision_meshes,
+    file_of_mesh,
+    has_shape,
+    is_found,
+    links_in,
+    may_be_refused,
+    texture_replacements,
+)
 from dynx.rules.inertia import has_inertial_data
 from dynx.spatial.scalar import Floats
 from dynx.workers import Workers
@@ -128,10 +137,13 @@ def without_meshes(source: XmlSource, *, collisions: bool = True) -> XmlSource:
     """Remove visual shapes, textures that engines find and, with `collisions`, collision shapes that are
     meshes. Visuals for which an engine may refuse the file are left, with a box in place of a mesh file.
 
-    In MJCF and SDF masses may follow from meshes, so that these documents stay as they are.
+    In MJCF masses may follow from meshes, so that these documents stay as they are. In SDF they may follow
+    from those of collisions, of which the missing ones are removed.
     """
-    if format_of_root(source.root.tag) != "urdf":
-        return source
+    form = format_of_root(source.root.tag)
+    if form != "urdf":
+        edits_of_sdf = _mesh_edits_of_sdf(source) if form == "sdf" else ()
+        return source.apply(*map(source.keeping_lines, edits_of_sdf))
     links = source.root.all("link")
     visuals = [shape for link in links for shape in link.all("visual") if has_shape(shape)]
     left = [shape for shape in visuals if may_be_refused(shape)]
@@ -141,6 +153,20 @@ def without_meshes(source: XmlSource, *, collisions: bool = True) -> XmlSource:
         shapes += [shape for link in links for shape, _ in collision_meshes(link)]
     edits = (*map(source.removal, shapes), *boxes, *texture_replacements(source))
     return source.apply(*map(source.keeping_lines, edits))
+
+
+_BOX_OF_SDF = "<box><size>1 1 1</size></box>"
+
+
+def _mesh_edits_of_sdf(source: XmlSource) -> Iterator[Edit]:
+    """Write a box in place of each mesh of a visual; remove collisions whose mesh is not found."""
+    for part in (part for link in links_in(source) for part in link.children):
+        for mesh in (each for each in part.walk() if each.tag == "mesh"):
+            if part.tag == "visual":
+                yield source.replacement(mesh, _BOX_OF_SDF)
+            elif part.tag == "collision" and not is_found(file_of_mesh(source, mesh), source.source):
+                yield source.removal(part)
+                break
 
 
 def _named_meshes(shape: SourceElement) -> list[SourceElement]:

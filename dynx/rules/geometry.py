@@ -493,23 +493,39 @@ def may_be_refused(visual: SourceElement) -> bool:
 # Meshes that dynx does not read, so that no rule compares a mass or an inertia with their size.
 
 
-def named_meshes(source: XmlSource) -> Iterator[tuple[SourceElement, SourceElement]]:
-    """Yield the first ``<mesh>`` of each file that a description names, after its ``<link>``."""
+def links_in(source: XmlSource) -> list[SourceElement]:
+    """List the ``<link>`` elements of a robot in URDF, or of all models in SDF, in document order."""
+    return [each for each in source.root.walk() if each.tag == "link" and _holds_links(each.parent)]
+
+
+def _holds_links(element: SourceElement | None) -> bool:
+    return element is not None and (element.parent is None or element.tag == "model")
+
+
+def file_of_mesh(source: XmlSource, mesh: SourceElement) -> str:
+    """Return the file that a ``<mesh>`` names: its attribute ``filename``, or ``<uri>`` in SDF."""
+    uri = mesh.first("uri")
+    return mesh.attributes.get("filename", "") if uri is None else source.text_in(uri)
+
+
+def named_meshes(source: XmlSource) -> Iterator[tuple[SourceElement, SourceElement, str]]:
+    """Yield the first ``<mesh>`` of each file that a description in URDF or SDF names, after its ``<link>``
+    and before the file."""
     seen = {""}
-    for link in source.root.all("link"):
+    for link in links_in(source):
         for element in geometry_elements(link):
-            filename = element.attributes.get("filename", "")
-            if element.tag == "mesh" and filename not in seen:
-                seen.add(filename)
-                yield link, element
+            file = file_of_mesh(source, element) if element.tag == "mesh" else ""
+            if file not in seen:
+                seen.add(file)
+                yield link, element, file
 
 
 def parts_with_meshes(source: XmlSource) -> dict[str, set[str]]:
     """Return the parts of links, ``visual`` or ``collision``, in which each mesh file is named."""
     parts: dict[str, set[str]] = {}
-    for part in (part for link in source.root.all("link") for part in link.children):
+    for part in (part for link in links_in(source) for part in link.children):
         for mesh in (each for each in part.walk() if each.tag == "mesh"):
-            parts.setdefault(mesh.attributes.get("filename", ""), set()).add(part.tag)
+            parts.setdefault(file_of_mesh(source, mesh), set()).add(part.tag)
     return parts
 
 

@@ -17,8 +17,8 @@ from dynx.engines.mujoco.as_loaded import LoadedMujoco
 from dynx.loaded import installed_engines
 from dynx.model import Model
 from dynx.model.xml.source import XmlSource
-from dynx.rules import all_rules
-from dynx.rules.registry import find_trap, trap_case
+from dynx.rules import Case, all_rules
+from dynx.rules.registry import find_rule, find_trap, trap_case
 
 needs_all = pytest.mark.skipif(len(installed_engines()) < 4, reason="needs all engines")
 
@@ -35,6 +35,16 @@ WITHOUT_CAUSE = {
     </joint>
 """,
     "DX706": "<spring_stiffness>5</spring_stiffness>",
+    "DX708": """    <include>
+      <uri>model://dx711_tool</uri>
+      <pose>1 0 0 0 0 0</pose>
+    </include>
+    <joint name="mounting" type="fixed">
+      <parent>lower</parent>
+      <child>tool::body</child>
+    </joint>
+""",
+    "DX709": "link",
 }
 """What of the trap of each stated omission is its cause."""
 
@@ -71,6 +81,9 @@ def test_a_stated_omission_is_that_of_the_trap(rule: Any) -> None:
     text = trap_case(rule).source.text
     if rule.id == "DX608":
         start, end = text.index("        <frame"), text.index("</frame>") + len("</frame>\n")
+        text = text[:start] + text[end:]
+    elif rule.id == "DX709":
+        start, end = text.rindex("    <link"), text.rindex("</link>") + len("</link>\n")
         text = text[:start] + text[end:]
     elif rule.id == "DX612":
         text = text.replace(WITHOUT_CAUSE[rule.id], 'pos="0.625 0 0"')
@@ -198,3 +211,32 @@ def test_a_copy_keeps_the_format_of_the_document() -> None:
         with temporary_document(XmlSource(text)) as path:
             assert path.suffix == suffix
             assert path.read_text() == text
+
+
+@needs_all
+def test_a_missing_mesh_of_sdf_is_named_and_hinders_no_comparison(tmp_path: Path) -> None:
+    """As of URDF: an engine that refuses the file for its mesh is named, and compared without the mesh."""
+    shape = '<{0} name="{0}"><geometry><mesh><uri>model://crane/{0}.stl</uri></mesh></geometry></{0}>'
+    path = tmp_path / "crane.sdf"
+    free = SDF.replace(
+        '<joint name="foot" type="fixed"><parent>world</parent><child>mast</child></joint>', ""
+    )
+    for kind in ("visual", "collision"):
+        path.write_text(free.replace('<link name="boom">', f'<link name="boom">{shape.format(kind)}'))
+        report = diagnose(path, samples=1)
+        (mesh,) = report.unread_meshes
+        assert (mesh.link, mesh.line) == ("boom", 7)
+        assert mesh.refused_by == ("pybullet",)
+        assert report.status == "explained", report.unexplained
+        assert "model 'crane' was not found" in mesh.reason
+
+
+def test_shapes_of_one_link_with_one_name_get_names_of_their_own() -> None:
+    shape = '<visual name="v"><geometry><sphere><radius>0.1</radius></sphere></geometry></visual>'
+    case = Case(XmlSource(SDF.replace('<link name="boom">', f'<link name="boom">{3 * shape}')), "fixed")
+    rule = find_rule("DX710")
+    remedy = rule.remedy(case, rule.detect(case))
+    assert remedy is not None
+    text = remedy.case.source.text
+    assert [text.count(f'"{name}"') for name in ("v", "v_2", "v_3")] == [1, 1, 1]
+    assert not rule.detect(remedy.case)

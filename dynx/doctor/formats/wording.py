@@ -211,6 +211,9 @@ def unread_meshes(report: DoctorReport) -> str:
         shown += f"; {len(unread) - count} for other reasons"
     which = f"{len(unread)} of {report.meshes} mesh files" if report.meshes > 1 else "the mesh file"
     without = refused_without_mesh(report.refused_without_meshes)
+    if report.format != "urdf":
+        them = "it" if len(unread) == 1 else "them"
+        return f"{which} could not be found ({shown}); engines are compared without {them}{without}"
     return (
         f"{which} could not be read ({shown}); engines are compared without meshes, but masses and inertias "
         f"of such links are not checked against the size of their shapes ({SHAPE_RULES}){without}"

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -52,6 +52,7 @@ from dynx.loaded.robot import (
 from dynx.model import Model
 from dynx.model.document_format import Format
 from dynx.model.mechanism import float64, pose_arrays
+from dynx.model.package_search import MODEL_MANIFEST
 from dynx.model.xml.source import SourceElement, XmlSource
 from dynx.spatial.inertia import inertia_about_origin
 from dynx.spatial.scalar import Floats
@@ -69,6 +70,10 @@ CALLS: Mapping[str, str] = {
         "for i in plant.GetJointActuatorIndices():  # before plant.Finalize()\n"
         "    plant.get_mutable_joint_actuator(i).set_default_rotor_inertia(0)"
     ),
+    "drake.add_models": (
+        "parser = Parser(plant)  # for each model://NAME of the file, before parser.AddModels(path)\n"
+        "parser.package_map().Add(NAME, FOLDER)"
+    ),
     "drake.set_inertias": (
         "# for each link in Drake's warnings; I is about the link's origin, in its axes;\n"
         "# where the file has no mass, m = 2**-200, because Drake holds an inertia per unit of mass\n"
@@ -81,6 +86,33 @@ CALLS: Mapping[str, str] = {
 NEGLIGIBLE_MASS = 2.0**-200
 """Mass [kg] of a link for which the file states an inertia and no mass: a power of two, so that dividing
 by it is exact, and so small that its weight is below rounding."""
+
+
+def model_folders(path: Path) -> dict[str, Path]:
+    """Return the folders of the models that a document in SDF includes as ``model://NAME``, and of those that
+    they include, by name.
+
+    Each is looked for around its document, in no more folders than links lead to (`dynx.doctor.examination`).
+    """
+    found: dict[str, Path] = {}
+    waiting = [path]
+    while waiting:
+        document = waiting.pop()
+        for encoded in _MODEL_NAME.findall(read_file(str(document))):
+            name = encoded.decode(errors="replace")
+            folders = [] if name in found else [above / name for above in document.parents[:_FOLDERS_ABOVE]]
+            for folder in folders:
+                if (folder / MODEL_MANIFEST).is_file():
+                    found[name] = folder
+                    waiting += sorted(folder.glob("*.sdf"))
+                    break
+    return found
+
+
+_FOLDERS_ABOVE = 5
+"""Number of folders, that of the document included, in which a model is looked for."""
+
+_MODEL_NAME = re.compile(rb"model://([^/<\s.][^/<\s]*)")
 
 
 def set_before_finalize(plant: Any, joints: Mapping[str, Any], path: Path, calls: Collection[str]) -> None:
@@ -286,7 +318,7 @@ class LoadedDrake(LoadedRobot):
         create, read, *weld, finalize = self.load_call(model.floating, model.root, self._form).splitlines()
         names = {
             "MultibodyPlant": MultibodyPlant,
-            "Parser": Parser,
+            "Parser": self._parser(path, calls),
             "path": str(path),
             "root_link": model.root,
         }
@@ -311,6 +343,19 @@ class LoadedDrake(LoadedRobot):
         self._coordinates = self._find_coordinates()
         self._torque = plant.get_applied_generalized_force_input_port()
         self._acceleration = plant.get_generalized_acceleration_output_port()
+
+    @staticmethod
+    def _parser(path: Path, calls: Collection[str]) -> Callable[[Any], Any]:
+        """Return what makes a parser of a plant, which knows the folders of models if `calls` say so."""
+        folders = model_folders(path) if "drake.add_models" in calls else {}
+
+        def knowing(plant: Any) -> Any:
+            parser = Parser(plant)
+            for name, folder in folders.items():
+                parser.package_map().Add(name, str(folder))
+            return parser
+
+        return knowing
 
     @classmethod
     def engine_version(cls) -> str:

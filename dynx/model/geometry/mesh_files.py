@@ -26,7 +26,7 @@ _BULLET_SCHEMES = re.compile("^(file|package|model)://")
 _BULLET_FORMATS = (".stl", ".obj", ".dae")
 """Ends of the names of meshes that PyBullet reads; it refuses a description with others."""
 
-_THREE_SLASHES = re.compile("^package:///+")
+_PACKAGE = re.compile("^(package:///+|model://)")
 
 
 class MeshNotFoundError(Exception):
@@ -45,9 +45,10 @@ def find_mesh(filename: str, source: str, package_dirs: Iterable[StrPath] = ()) 
     `enclosing_folder`) and the packages: a path that leads elsewhere, also by a symbolic link, gives None.
     Folders in `package_dirs`, which the user names, are searched first: for packages, and for other paths
     that lead into them.
-    ``package:///NAME/FILE``, with a slash too many, is read as ``package://NAME/FILE``.
+    ``package:///NAME/FILE``, with a slash too many, is read as ``package://NAME/FILE``, and so is
+    ``model://NAME/FILE``, in which Gazebo names a folder with a ``model.config``.
     """
-    filename = _THREE_SLASHES.sub("package://", filename)
+    filename = _PACKAGE.sub("package://", filename)
     for folder in package_dirs:
         found = _in_user_folder(filename, Path(folder), source)
         if found is not None:
@@ -110,18 +111,19 @@ def reason_unknown(filename: str, source: str) -> str:
     """Return the reason why `find_mesh` does not know the folder of a mesh."""
     if not os.path.isfile(source):
         return "the description was not read from a file"
-    filename = _THREE_SLASHES.sub("package://", filename)
+    kind = "model" if filename.startswith("model://") else "package"
+    filename = _PACKAGE.sub("package://", filename)
     if filename.startswith("package://"):
         name, _, inside = filename.removeprefix("package://").partition("/")
         if not inside:
-            return f"{shown(filename, 200)} names a package and no file in it"
+            return f"{shown(filename, 200)} names a {kind} and no file in it"
         try:
             found = package_of(name, Path(os.path.realpath(source)).parent, environment_folders())
         except (OSError, ValueError, RuntimeError):
             found = None
         if found is not None:
-            return f"{shown(filename, 200)} is outside its package"
-        return f"package {shown(name)} was not found{_possible_package(filename, source)}"
+            return f"{shown(filename, 200)} is outside its {kind}"
+        return f"{kind} {shown(name)} was not found{_possible_package(filename, source)}"
     if "$(" in filename:
         return "only xacro and launch files expand $(...)"
     if "://" in filename and not filename.startswith("file://"):

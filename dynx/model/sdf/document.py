@@ -457,16 +457,12 @@ def find_file(reading: SdfReading, element: Element, uri: str, package_dirs: Ite
     if _REMOTE.match(uri):
         raise MeshNotFoundError("dynx reads nothing from the network; name a file")
     source = reading.source_of(element)
-    name = re.sub("^model://", "package://", uri)
+    name = uri
     if name.startswith("file://") and not name.startswith("file:///"):
         name = name.removeprefix("file://")
-    try:
-        found = find_mesh(name, source, package_dirs)
-    except MeshNotFoundError as error:
-        raise MeshNotFoundError(str(error)) from None
+    found = find_mesh(name, source, package_dirs)
     if found is None:
-        reason = reason_unknown(name, source)
-        raise MeshNotFoundError(reason.replace("package", "model") if name != uri else reason)
+        raise MeshNotFoundError(reason_unknown(name, source))
     return str(found)
 
 

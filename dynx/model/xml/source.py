@@ -190,6 +190,11 @@ class XmlSource:
         removed = len(_LINE_END.findall(self.data, start, end))
         return Edit(start, end, edit.text + "\n" * (removed - edit.text.count("\n")))
 
+    def text_in(self, element: SourceElement) -> str:
+        """Return the text of an element without children, without blanks around it."""
+        inside = self.data[element.start_tag.end : element.span.end].decode()
+        return "" if element.empty else inside.partition("</")[0].strip()
+
     # -- edits --------------------------------------------------------------------------------
 
     def attribute_edit(self, element: SourceElement, name: str, value: str) -> Edit:

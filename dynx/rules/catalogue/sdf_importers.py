@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 
 from dynx.model.document_format import Format
-from dynx.model.xml.source import SourceElement
-from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Rule, measured_on
+from dynx.model.xml.source import Edit, SourceElement
+from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Remedy, Rule, measured_on
+from dynx.rules.joints import fresh_name
 
 
 def _parts(case: Case, tag: str) -> Iterator[SourceElement]:
@@ -70,17 +72,15 @@ def _is_box(case: Case, link: SourceElement) -> bool:
     if len(collisions) != 1 or len(sizes) != 1 or name not in names:
         return False
     inertial = case.model.inertial(name)
-    x, y, z = (each * each / 12.0 for each in map(float, _text(case, sizes[0]).split()))
+    x, y, z = (each * each / 12.0 for each in map(float, case.source.text_in(sizes[0]).split()))
     wanted = [inertial.mass * each for each in (y + z, x + z, x + y)]
     held = [inertial.ixx, inertial.iyy, inertial.izz]
     close = all(abs(one - other) <= 1e-12 * max(held) for one, other in zip(wanted, held, strict=True))
     return close and not any((inertial.ixy, inertial.ixz, inertial.iyz))
 
 
-def _text(case: Case, element: SourceElement) -> str:
-    """Return the text of an element without children."""
-    inside = case.source.data[element.start_tag.end : element.span.end].decode()
-    return inside.partition("</")[0].strip()
+def _is_true(case: Case, element: SourceElement) -> bool:
+    return case.source.text_in(element) in ("1", "true")
 
 
 class AxisWithoutLimit(EditingRule):
@@ -184,7 +184,10 @@ class FramesOfSdf(Rule):
                         if named or (element.tag == "pose" and holder == "joint"):
                             what = " and ".join(named) if named else "a pose of its own"
                             yield _found(part, element, f"<{element.tag}> of <{holder}> has {what}")
-                    elif element.tag == "use_parent_model_frame" and _text(case, element) in ("1", "true"):
+                    elif element.tag == "use_parent_model_frame" and case.source.text_in(element) in (
+                        "1",
+                        "true",
+                    ):
                         yield _found(part, element, "the axis is stated in the frame of the model")
 
 
@@ -212,7 +215,7 @@ class JointToWorld(Rule):
         """Yield joints whose parent is the world."""
         for joint in _parts(case, "joint"):
             parent = joint.first("parent")
-            if parent is not None and _text(case, parent) == "world":
+            if parent is not None and case.source.text_in(parent) == "world":
                 yield _found(joint, parent, "the parent of the joint is the world")
 
 
@@ -243,8 +246,10 @@ class SpringOfSdf(Rule):
         """Yield springs whose stiffness is not zero."""
         for joint in _parts(case, "joint"):
             for element in joint.walk():
-                if element.tag == "spring_stiffness" and float(_text(case, element) or "0"):
-                    yield _found(joint, element, f"the joint has a stiffness of {_text(case, element)}")
+                if element.tag == "spring_stiffness" and float(case.source.text_in(element) or "0"):
+                    yield _found(
+                        joint, element, f"the joint has a stiffness of {case.source.text_in(element)}"
+                    )
 
 
 class EmptyDynamicsOfSdf(EditingRule):
@@ -276,3 +281,174 @@ class EmptyDynamicsOfSdf(EditingRule):
                     continue
                 detection = _found(joint, dynamics, "<dynamics> has neither damping nor friction")
                 yield Correction(detection, (case.source.insertion(dynamics, "<damping>0</damping>"),))
+
+
+class IncludeOfSdf(Rule):
+    """DX708 include-of-sdf: A model of SDF includes another, which PyBullet leaves out.
+
+    ``<include><uri>model://arm</uri></include>`` adds the model of another file.
+
+    - Drake 1.51 reads the file that the URI names (DX711).
+    - PyBullet 3.2.7 (``loadSDF``) skips the element without a message. It refuses a file without other links:
+      "Cannot load SDF file".
+
+    The robot lacks the links and joints of the other file.
+
+    What to do: convert the file to one that has all links (``dynx convert --to urdf`` or ``--to sdf``).
+    ``dynx doctor --fix`` does not change it.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    stated = True
+    stated_refusal = True
+    advice = "Convert the file to one with all links (dynx convert)."
+    engines = measured_on("pybullet")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the includes of models and worlds."""
+        for element in case.source.root.walk():
+            if element.tag == "include":
+                yield Detection(None, None, element.line, f"the file includes {_uri(case, element)}")
+
+
+def _uri(case: Case, include: SourceElement) -> str:
+    uri = include.first("uri")
+    return "" if uri is None else case.source.text_in(uri)
+
+
+class SeveralRootsOfSdf(Rule):
+    """DX709 several-roots-of-sdf: Several links of a model are the child of no joint, and PyBullet crashes.
+
+    A static model of SDF may have links that no joint connects: all of them are fixed to the world.
+
+    - Drake 1.51 welds each of them to its world.
+    - PyBullet 3.2.7 (``loadSDF``) writes "URDF file with multiple root links found", and then the process
+      ends with a segmentation fault.
+
+    What to do: connect the links by fixed joints, or convert the file to URDF, which has them (``dynx convert
+    --to urdf``). ``dynx doctor --fix`` does not change it.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    stated = True
+    stated_refusal = True
+    advice = "Connect the links by fixed joints (dynx convert --to urdf)."
+    engines = measured_on("pybullet")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the second root of each model."""
+        for model in case.source.root.walk():
+            if model.tag != "model":
+                continue
+            ends = [child for joint in model.all("joint") for child in joint.all("child")]
+            children = {case.source.text_in(each) for each in ends}
+            roots = [each for each in model.all("link") if each.attributes.get("name") not in children]
+            for link in roots[1:2]:
+                yield _found(link, link, f"the model has {len(roots)} links that are the child of no joint")
+
+
+class SharedNameOfSdf(EditingRule):
+    """DX710 shared-name-of-sdf: Two parts of one model or link have the same name, for which Drake refuses
+    the file.
+
+    Names of links, joints and frames must differ within a model, and those of collisions and of visuals
+    within a link. Older files have a joint with the name of its link, or two visuals called ``visual``.
+
+    - Drake 1.51 refuses the whole file: "Non-unique name" or "visual with name[visual] already exists".
+    - PyBullet 3.2.7 (``loadSDF``) loads it.
+
+    What to do: give the second part another name. ``dynx doctor --fix`` does so, in mimic joints too;
+    programs that look a joint up by its name must be changed with it.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    advice = "Give each part of a model and of a link a name of its own."
+    engines = measured_on("drake")
+    changed = "gave parts with the name of another one a name of their own"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield joints with the name of a link, and shapes with that of another, in document order."""
+        for model in case.source.root.walk():
+            if model.tag != "model":
+                continue
+            links = {each.attributes.get("name") for each in model.all("link")}
+            taken = links | {each.attributes.get("name") for each in model.all("joint")}
+            for part in model.children:
+                name = part.attributes.get("name", "")
+                if part.tag == "link":
+                    yield from _shapes_of_one_name(case, part)
+                elif part.tag == "joint" and name in links:
+                    new = fresh_name(f"{name}_joint", [each for each in taken if each])
+                    taken.add(new)
+                    detection = _found(part, part, "the joint has the name of a link")
+                    yield Correction(detection, _joint_edits(case, model, part, new))
+
+
+def _joint_edits(case: Case, model: SourceElement, joint: SourceElement, new: str) -> tuple[Edit, ...]:
+    """Return the edits that give a joint another name, also where others follow it."""
+    old = joint.attributes.get("name")
+    followers = [each for each in model.walk() if each.tag == "mimic" and each.attributes.get("joint") == old]
+    edits = [case.source.attribute_edit(joint, "name", new)]
+    edits += [case.source.attribute_edit(each, "joint", new) for each in followers]
+    return tuple(edits)
+
+
+def _shapes_of_one_name(case: Case, link: SourceElement) -> Iterator[Correction]:
+    for tag in ("collision", "visual"):
+        taken: set[str] = set()
+        for shape in link.all(tag):
+            name = shape.attributes.get("name", "")
+            if name in taken:
+                new = fresh_name(f"{name}_{len(taken) + 1}", taken)
+                detection = _found(link, shape, f"another <{tag}> of the link has the name {name}")
+                yield Correction(detection, (case.source.attribute_edit(shape, "name", new),))
+                name = new
+            taken.add(name)
+
+
+class ModelsInOtherFolders(CallingRule):
+    """DX711 models-in-other-folders: The file includes a model by its name, which Drake does not search for.
+
+    ``model://arm`` is a folder with the name ``arm`` or a ``model.config``. Gazebo searches for it in the
+    folders of ``GZ_SIM_RESOURCE_PATH``, dynx around the file and in ``package_dirs``.
+
+    - Drake 1.51 knows the folders in the ``package_map`` of its parser alone, and refuses the file: "Unable
+      to find uri". With the folder it reads ``model://arm/`` and ``model://arm/model.sdf``, but not
+      ``model://arm``.
+    - PyBullet 3.2.7 (``loadSDF``) leaves out what a file includes (DX708).
+
+    What to do: end the URI with a slash, as ``dynx doctor --fix`` does, and add each folder to the package
+    map before the file is read; doctor prints the call.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    advice = "End the URI with a slash, and add the folder to the package map of Drake's parser."
+    engines = measured_on("drake")
+    calls = ("drake.add_models",)
+    changed = "added the folders of models to the package map and a slash to their names"
+    per_joint = False
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield includes by the name of a model."""
+        for element in case.source.root.walk():
+            if element.tag == "include" and _uri(case, element).startswith("model://"):
+                yield Detection(None, None, element.line, f"the file includes {_uri(case, element)}")
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """Return the case with the call, and with a slash after the name of each model."""
+        includes = [each for each in case.source.root.walk() if each.tag == "include"]
+        uris = [each.first("uri") for each in includes if _MODEL.fullmatch(_uri(case, each))]
+        edits = [
+            case.source.replacement(uri, f"<uri>{case.source.text_in(uri)}/</uri>")
+            for uri in uris
+            if uri is not None
+        ]
+        called = case.with_source(case.source.apply(*edits)).with_calls(*self.calls)
+        return Remedy(called, self.changed)
+
+
+_MODEL = re.compile("model://[^/]+")
+"""URI of a model without a path in its folder."""
