@@ -20,6 +20,7 @@ from dynx.loaded import LoadedRobot
 from dynx.loaded.difference import Deviation, model_difference
 from dynx.model import Inertial, JointDynamics, Model
 from dynx.model.tree import Base
+from dynx.rules.registry import find_trap
 from tests.backends.robots import chain, motion
 from tests.loaded.files import TILTED, assert_alike, clean_robots, loaded
 from tests.loaded.fork import BASES, BODY, check_loaded_as_written, forked
@@ -170,7 +171,18 @@ def test_a_rotor_inertia_is_in_the_mass_matrix() -> None:
     assert held.effort == 9.0
 
 
-@pytest.mark.parametrize("call", [*LoadedDrake.CALLS])
+def test_the_call_that_adds_models_runs_as_it_is_shown() -> None:
+    path = find_trap("DX711")
+    create = LoadedDrake.load_call(True, form="sdf").splitlines()[0]
+    names: dict[str, Any] = {"MultibodyPlant": MultibodyPlant, "Parser": Parser}
+    names |= {"NAME": "dx711_tool", "FOLDER": str(path.parent / "dx711_tool")}
+    exec(f"{create}\n{LoadedDrake.CALLS['drake.add_models']}", names)
+    text = path.read_text().replace("model://dx711_tool", "model://dx711_tool/")
+    names["parser"].AddModelsFromString(text, "sdf")
+    assert names["plant"].num_model_instances() == 4  # the world, the default one, the robot and its tool
+
+
+@pytest.mark.parametrize("call", [each for each in LoadedDrake.CALLS if each != "drake.add_models"])
 def test_each_call_that_is_shown_runs_as_it_is_shown(call: str, tmp_path: Path) -> None:
     model = forked()
     path = tmp_path / "robot.urdf"
