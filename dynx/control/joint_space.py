@@ -124,8 +124,8 @@ class Velocity(JointSpace[None], pure=True):
 class PID(JointSpace[Floats], pure=True):
     """tau = kp e + kd e' + z with z' = ki e, saturated at the effort limits.
 
-    Anti-windup by back-calculation (Astrom and Murray, Feedback Systems, section 11.4): the torque beyond the
-    limits is fed back into z with the time constant `tracking_time`, so z stays within the range of the
+    Anti-windup is by back-calculation (Astrom and Murray, Feedback Systems, section 11.4). The torque beyond
+    the limits is fed back into z with the time constant `tracking_time`, so z stays within the range of the
     motors. The state is z (n,) [N m or N], the integral part of the torque.
     """
 

@@ -341,8 +341,8 @@ class Joint:
 class Actuator:
     """Actuator of a joint, as a robot description states it. It is data: dynx applies no actuator.
 
-    Of the command u and of the position q and velocity v of the joint follow the force
-    ``f = gain u + bias[0] + bias[1] gear q + bias[2] gear v`` and the effort ``gear f`` [N m or N], as in
+    With the command u, and the position q and velocity v of the joint, the force is
+    ``f = gain u + bias[0] + bias[1] gear q + bias[2] gear v``, and the effort is ``gear f`` [N m or N], as in
     MuJoCo. u is kept within `control_range`, f within `force_range`. `name` may be empty.
     """
 

@@ -132,8 +132,8 @@ class Coupling:
 class Mechanism:
     """Bodies in depth-first order (a parent precedes its children), frames, gravity and coupling.
 
-    `links` are those of the description before merging, in depth-first order: joint k of the description, of
-    any type, carries link k + 1, and the frame of link k is frame k.
+    `links` are the links of the description before merging, in depth-first order. Joint k of the description,
+    of any type, carries link k + 1, and the frame of link k is frame k.
     """
 
     name: str

@@ -157,9 +157,10 @@ def excitation(
     the middle of the position limits, or 0 for a joint without limits, which moves at most pi [rad] or 1 m
     from there.
 
-    Of `candidates` (1 to `MAX_CANDIDATES`) series drawn with `rng`, a seed or a generator, the one with the
-    smallest condition number of the inertial regressor is returned, since its samples determine the inertial
-    parameters best (`dynx.trajectory.Identifiability`, evaluated by `backend`). Only for a fixed base.
+    `candidates` (1 to `MAX_CANDIDATES`) series are drawn with `rng`, a seed or a generator. The series with
+    the smallest condition number of the inertial regressor is returned, because its samples determine the
+    inertial parameters best (`dynx.trajectory.Identifiability`, evaluated by `backend`). Only for a fixed
+    base.
 
     Raises ArgumentError for invalid arguments, TrajectoryError for a limit of 0 or a q0 outside the limits.
     """

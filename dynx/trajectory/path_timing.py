@@ -207,10 +207,10 @@ def time_optimal_path(
 
     `velocity` and `acceleration` are limits, one number or (nv,), positive and finite; the default of
     `velocity` is the limit of the `model`. `effort` limits the torques of inverse dynamics by `backend`: True
-    for the limits of the `model`, one number or (nv,) [N m or N], with the joint dynamics of the description
-    if `joint_dynamics` is True; without it, `acceleration` has to be given. Limits are never
-    exceeded, and nearly always one is close to being reached (within 0.2 % on average for velocity and
-    acceleration, over random waypoints). The acceleration jumps. The path is a cubic spline, which may
+    for the limits of the `model`, one number or (nv,) [N m or N]. If `joint_dynamics` is True, the torques
+    include the joint dynamics of the description. Without `effort`, `acceleration` has to be given. Limits
+    are never exceeded, and nearly always one is close to being reached (within 0.2 % on average for velocity
+    and acceleration, over random waypoints). The acceleration jumps. The path is a cubic spline, which may
     overshoot the waypoints (`dynx.trajectory.check` checks position limits). Only for a fixed base.
 
     Raises NotInstalledError without the extra ``trajectory``, TrajectoryError if no such motion is found or a

@@ -390,8 +390,9 @@ class Viewer(Controls):
         return (*self.page.notes, *self.view.notes)
 
     def update(self, q: ArrayLike | None = None) -> None:
-        """Show the present state, from a loop of the program: the configuration q (nq,) of a robot, those
-        (n, nq) of its copies, or the state of a world that the program steps (``steps=False``).
+        """Show the present state, from a loop of the program. It is the configuration q (nq,) of a robot, the
+        configurations (n, nq) of its copies, or the state of a world that the program steps
+        (``steps=False``).
 
         The page shows as many of these as it can; the last is always among them. Raises ArgumentError for a
         robot without q, a world with one, a recorded motion, which has a timeline, and a viewer that is
@@ -538,13 +539,13 @@ class Viewer(Controls):
     ) -> None:
         """Write what is shown to a file, by its suffix.
 
-        ``.html`` shows the robot, or plays the motion, without a server and without a network; ``.gif`` and
-        ``.mp4`` (extra ``film``) are films of a motion, and ``.png`` a picture, drawn without a browser
-        (`progress` is called with the number of pictures drawn). These have the `size` given, width and
-        height [pixels], and are seen from a `direction` (3,) in the world, or by a `camera`, whose size they
-        have then. A film has `fps` pictures a second, or 12.5 and at most 500 in all for None. Pictures and
-        films show the marks, lines and text of the page, hide the parts that it hides, and say how
-        large the tiles of the ground are.
+        ``.html`` shows the robot, or plays the motion, without a server and without a network. ``.gif`` and
+        ``.mp4`` (extra ``film``) are films of a motion, and ``.png`` is a picture, all drawn without a
+        browser. `progress` is called with the number of pictures drawn. These have the `size` given, width
+        and height [pixels], and are seen from a `direction` (3,) in the world, or by a `camera`, whose size
+        they have then. A film has `fps` pictures a second, or 12.5 and at most 500 in all for None. Pictures
+        and films show the marks, lines and text of the page, hide the parts that it hides, and say how large
+        the tiles of the ground are.
 
         Raises ArgumentError for a live world, whose motion is not known before it has happened, for another
         suffix, for a file that cannot be written, for a page whose size, camera or direction is given, and

@@ -79,9 +79,10 @@ class Separation:
 def separation(ours: Record, theirs: Record, times: Floats | None = None) -> Separation:
     """Measure how far apart two records are over time, in the channels that both have.
 
-    `times` are compared as far as both records last; by default those of the record with the longer steps, or
-    those of the other where only one of them is in the common time. Where a record has no row at a time it is
-    interpolated between two. Raises ArgumentError for records without a common channel or time.
+    `times` are compared as far as both records last. By default they are the times of the record with the
+    longer steps. If only one of these is in the common time, they are the times of the other record. Where a
+    record has no row at a time it is interpolated between two. Raises ArgumentError for records without a
+    common channel or time.
     """
     # Imported here, because most worlds are compared with no other.
     from dynx.world.record import Record, checked_times

@@ -445,10 +445,10 @@ class World:
     def read_sensors(self) -> dict[str, SensorReading]:
         """Return the last reading of each sensor of the scene, by name.
 
-        A sample is taken at the beginning of a step of the engine and can be read after that step, or its
-        delay later; until the next one it is held. A sensor without a reading since the state was set is
-        absent, and ``readings["imu"]`` says so (ArgumentError; UnknownNameError for a sensor that the scene
-        lacks). `save` keeps the samples that are held or delayed.
+        A sample is taken at the beginning of a step of the engine. You can read it after that step, or its
+        delay later, until the next sample. A sensor without a reading since the state was set is absent, and
+        ``readings["imu"]`` says so (ArgumentError; UnknownNameError for a sensor that the scene lacks).
+        `save` keeps the samples that are held or delayed.
         """
         _ = self._motion.engine
         if self._sensors is None:

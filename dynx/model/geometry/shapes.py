@@ -88,10 +88,10 @@ MAX_HEIGHTS = 4_000_000
 class HeightField:
     """A ground with height `heights[row][column]` [m] on a regular grid, for bodies fixed in the world.
 
-    The grid spans `size` [m] along x and y and is centred in the shape's frame: columns run from -size[0] / 2
-    to size[0] / 2 along x, rows from -size[1] / 2 to size[1] / 2 along y. Heights are measured along z from
-    the origin of the frame. Each cell is two triangles, divided by the diagonal from its corner of lowest
-    x and y to that of highest x and y.
+    The grid spans `size` [m] along x and y and is centred in the shape's frame. Columns run from -size[0] / 2
+    to size[0] / 2 along x, and rows from -size[1] / 2 to size[1] / 2 along y. Heights are measured along z
+    from the origin of the frame. Each cell is two triangles, divided by the diagonal from its corner of
+    lowest x and y to that of highest x and y.
     """
 
     heights: tuple[tuple[float, ...], ...]

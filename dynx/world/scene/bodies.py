@@ -125,8 +125,8 @@ class SceneBody:
     def drawn_shapes(self) -> Iterator[tuple[Shape, Colour, Floats]]:
         """Yield the shapes by which the body is drawn, each with its colour and its pose in the body (4, 4).
 
-        `coloured_shapes` says how, with the colour of the material of the body for shapes without one of
-        their own; a mesh is drawn as its file says where the body has the default colour, grey.
+        `coloured_shapes` states the colours. A shape without a colour of its own has the colour of the
+        material of the body. If the body has the default colour, grey, a mesh has the colours of its file.
         """
         # Imported here, because most scenes are never drawn.
         from dynx.model.geometry.drawn_shapes import coloured_shapes

@@ -56,14 +56,15 @@ def read_scene(
 ) -> Scene:
     """Read a scene from a ``.toml`` or ``.json`` file, one of the scenes of dynx by its name, or MJCF.
 
-    The page "Scenes and worlds" of the documentation describes the keys. The robots and meshes
-    that a file names lie in its folder (its repository or package, if it lies in one), in the libraries of
-    robots, or in `package_dirs`, and no other file is read. A robot in a ``.xacro`` file is expanded, which
-    evaluates expressions of that file as Python code: read only scenes with such files that you trust. Other
-    files may come from anyone.
+    The page "Scenes and worlds" of the documentation describes the keys. dynx reads the robots and meshes
+    that a file names only from its folder (its repository or package, if it lies in one), from the libraries
+    of robots, and from `package_dirs`. A robot in a ``.xacro`` file is expanded, which evaluates expressions
+    of that file as Python code: read only scenes with such files that you trust. Other files may come from
+    anyone.
 
-    A file in MJCF (``.xml``, ``.mjcf``) starts at its `qpos0`, or at the `keyframe` of that name; the page
-    "Robots in MJCF" says what becomes what, and `notes` of the scene name what is not read.
+    A file in MJCF (``.xml``, ``.mjcf``) starts at its `qpos0`, or at the `keyframe` of that name. The page
+    "Robots in MJCF" lists how dynx reads its elements, and `notes` of the scene name elements that dynx does
+    not read.
 
     Raises RobotNotFoundError where nothing is there, ArgumentError and its kinds for a file that is no scene,
     with the place in it, and the errors of `dynx.load` for its robots. UnknownNameError for a keyframe that
