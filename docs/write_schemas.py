@@ -21,8 +21,8 @@ from dynx.cli.learning.documents import EnvDistanceDocument, PlayDocument, Tasks
 from dynx.cli.sim.report import SimDocument
 from dynx.cli.sim.tutorial import TutorialDocument
 from dynx.cli.world import WorldDocument
-from dynx.doctor.formats.baseline import BaselineDocument
 from dynx.doctor.report import DoctorDocument
+from dynx.files.baseline import BaselineDocument
 from dynx.files.documents import json_schema
 from dynx.same.report import SameDocument
 from dynx.sim.scenario.scenario import ScenarioDocument
@@ -35,7 +35,11 @@ def schemas() -> dict[str, dict[str, Any]]:
     """The schema of each document, by the name of its file."""
     return {
         "agree": json_schema(AgreementDocument, "dynx agree --json"),
-        "baseline": json_schema(BaselineDocument, "dynx doctor --write-baseline", omits_defaults=True),
+        "baseline": json_schema(
+            BaselineDocument,
+            "dynx doctor, dynx same --write-baseline",
+            omits_defaults=True,
+        ),
         "bench": json_schema(BenchDocument, "dynx bench --json"),
         "compare": json_schema(CompareDocument, "dynx compare --json"),
         "contacts": json_schema(ContactsDocument, "dynx contacts --json"),

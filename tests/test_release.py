@@ -17,7 +17,7 @@ import dynx
 
 ROOT = Path(__file__).resolve().parents[1]
 ACTION: dict[str, Any] = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
-INSTALL, EXAMINE = ACTION["runs"]["steps"][1:]
+INSTALL, EXAMINE, COMPARE = ACTION["runs"]["steps"][1:]
 
 
 def variables(step: dict[str, Any], **inputs: str) -> dict[str, str]:
@@ -81,7 +81,7 @@ def test_workflows_have_the_least_permissions(path: Path) -> None:
 
 
 def test_scripts_of_the_action_read_inputs_from_variables_only() -> None:
-    for step in (INSTALL, EXAMINE):
+    for step in (INSTALL, EXAMINE, COMPARE):
         assert "${{" not in step["run"]
 
 
@@ -138,7 +138,7 @@ def test_the_action_fails_on_a_robot_that_engines_load_differently(
     outputs = dict(
         line.split("=", 1) for line in (tmp_path / "output").read_text(encoding="utf-8").splitlines()
     )
-    assert set(outputs) == set(ACTION["outputs"])
+    assert set(outputs) == set(ACTION["outputs"]) - {"pairs"}
     assert "DX" in Path(outputs["sarif"]).read_text(encoding="utf-8")
     assert "alike" in Path(outputs["junit"]).read_text(encoding="utf-8")
     assert differs.name.split()[0].replace("'", "&#39;") in Path(outputs["html"]).read_text(encoding="utf-8")
@@ -148,3 +148,35 @@ def test_the_action_refuses_an_empty_list(runner: dict[str, str], tmp_path: Path
     result = run(EXAMINE["run"], runner | variables(EXAMINE, robots="\n"), tmp_path)
     assert result.returncode == 2
     assert "ROBOT" in result.stderr
+
+
+def test_the_action_compares_pairs(runner: dict[str, str], tmp_path: Path) -> None:
+    own = ROOT / "models/six_axis_arm.urdf"
+    text = own.read_text(encoding="utf-8")
+    for name, mass in (("a", "4.2"), ("b$(touch${IFS}executed)", "4.5")):
+        changed = text.replace('mass value="4.2"', f'mass value="{mass}"')
+        (tmp_path / f"{name}.urdf").write_text(changed, encoding="utf-8")
+    (other,) = (each.name for each in tmp_path.glob("b*.urdf"))
+    for pairs, status in (
+        ("a.urdf a.urdf\n", 0),
+        (f"\na.urdf a.urdf\na.urdf  {other}\n", 1),
+        ("a.urdf\n", 2),
+    ):
+        result = run(COMPARE["run"], runner | variables(COMPARE, pairs=pairs), tmp_path)
+        assert result.returncode == status, result.stdout + result.stderr
+    result = run(COMPARE["run"], runner | variables(COMPARE, pairs=f"a.urdf {other}"), tmp_path)
+    assert "::error file=" in result.stdout
+    assert not list(tmp_path.rglob("executed"))
+    (folder,) = {
+        line.split("=", 1)[1] for line in (tmp_path / "output").read_text(encoding="utf-8").splitlines()
+    }
+    assert {each.name for each in Path(folder).iterdir()} == {
+        f"{number}.{suffix}" for number in (1, 2) for suffix in ("html", "sarif", "xml")
+    }
+    accepted = tmp_path / "known.json"
+    command = f"same a.urdf '{other}' --write-baseline {accepted.name}"
+    assert run(f"dynx-venv/bin/dynx {command}", runner, tmp_path).returncode == 0
+    known = {"pairs": f"a.urdf {other}", "pairs-baseline": accepted.name}
+    result = run(COMPARE["run"], runner | variables(COMPARE, **known), tmp_path)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "::error" not in result.stdout

@@ -1,33 +1,40 @@
-"""Run of ``dynx same``: both descriptions compared, with the mended file, a JSON document and exit code."""
+"""Run of ``dynx same``: both descriptions compared, with the mended file, reports and exit code."""
 
 from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import takewhile
 from pathlib import PurePath
+from typing import TYPE_CHECKING
 
+import click
 from rich.console import Console
 
 from dynx.cli.shell.exits import exit_code, failure_of, one_line, short_line
 from dynx.cli.shell.output import (
     Entry,
-    check_json,
     check_writable,
-    present,
+    command_line,
+    console,
+    echo_json,
     require_apart,
 )
+from dynx.cli.shell.reports import OutputFiles, show_comparison
 from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
 from dynx.errors import ArgumentError, shown
+from dynx.files.documents import json_text
 from dynx.files.writing import write_bytes
-from dynx.model.conversion import SUFFIXES
-from dynx.model.document_format import Format
+from dynx.model.document_format import SUFFIXES, Format
 from dynx.model.loading import read_description, split_arguments
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.same import SameReport, same_robot
 from dynx.same.comparison import TOLERANCE
+
+if TYPE_CHECKING:
+    from dynx.same.formats.baseline import SameBaseline
 
 MAX_CELL = 40
 """Largest number of characters of a value in a table; ``--json`` has all of it."""
@@ -46,22 +53,97 @@ def same(
     tolerance: float | None,
     fix: str | None,
     json_path: str | None,
+    html: str | None,
+    junit: str | None,
+    sarif: str | None,
+    github: bool,
+    baseline_path: str | None,
+    write_baseline: str | None,
 ) -> int:
     """Compare two descriptions; return the exit code."""
-    check_json(json_path)
-    read = _files_read(first, second) if fix is not None or json_path not in (None, "-") else []
-    if json_path is not None and json_path != "-":
-        require_apart([json_path], read, "a file that is read")
-        if fix is not None and os.path.realpath(json_path) == os.path.realpath(fix):
-            raise ArgumentError(f"--json {shown(json_path, 300)} is also that of --fix; wanted another file")
+    outputs = OutputFiles(json_path, html, junit, sarif, write_baseline, github)
+    outputs.check()
     if fix is not None:
         check_writable(fix)
-        require_apart([fix], read, "a file that is read")
-        _check_suffix(fix, second)
+        if json_path is not None and os.path.realpath(json_path) == os.path.realpath(fix):
+            raise ArgumentError(f"--json {shown(json_path, 300)} is also that of --fix; wanted another file")
+    if fix is not None or outputs.paths:
+        read = _files_read(first, second)
+        outputs.keep_apart(read, [fix], baseline_path, "a file that is read")
+        if fix is not None:
+            require_apart([fix], read, "a file that is read")
+            _check_suffix(fix, second)
+    known = None if baseline_path is None else _load_baseline(baseline_path)
     report = same_robot(first, second, base=base, tolerance=TOLERANCE if tolerance is None else tolerance)
-    written = None if fix is None else failure_of(_write_mended, report, fix)
-    error = present(report.to_dict(), show, json_path)
-    return exit_code(error, written, negative=not report.same)
+    written = [] if fix is None else [failure_of(_write_mended, report, fix)]
+    document = report.to_dict()
+    written += outputs.write_texts(_texts(outputs, report, known, first, second, document))
+    if github:
+        _echo_annotations(report, known)
+    if outputs.on_stdout:
+        echo_json(document)
+    else:
+        out = console()
+        show(out, document)
+        if known is not None:
+            who = f"{one_line(report.first)} and {one_line(report.second)}"
+            show_comparison(out, who, known.compare(report))
+    accepted = write_baseline is not None if known is None else not known.compare(report).new
+    return exit_code(*written, negative=not (report.same or accepted))
+
+
+def _load_baseline(path: str) -> SameBaseline:
+    from dynx.same.formats.baseline import SameBaseline
+
+    return SameBaseline.load(path)
+
+
+def _echo_annotations(report: SameReport, known: SameBaseline | None) -> None:
+    from dynx.files.annotations import github_annotations
+    from dynx.same.formats.sarif import sarif_document
+
+    for line in github_annotations(sarif_document(report, known)):
+        click.echo(line)
+
+
+def _texts(
+    outputs: OutputFiles,
+    report: SameReport,
+    known: SameBaseline | None,
+    first: str,
+    second: str,
+    document: Entry,
+) -> dict[str | None, Callable[[], str]]:
+    """Return what makes the text of each file. A format is imported where it is written."""
+
+    def page() -> str:
+        from dynx.same.formats.html import description_text, html_page
+
+        texts = description_text(first), description_text(second)
+        return html_page(report, texts=texts, command=command_line(), baseline=known)
+
+    def tests() -> str:
+        from dynx.same.formats.junit import junit_xml
+
+        return junit_xml(report, known)
+
+    def results() -> str:
+        from dynx.same.formats.sarif import sarif_document
+
+        return json_text(sarif_document(report, known)) + "\n"
+
+    def accepted() -> str:
+        from dynx.same.formats.baseline import baseline_document
+
+        return json_text(baseline_document(report, os.path.dirname(outputs.baseline or ""))) + "\n"
+
+    return {
+        outputs.json: lambda: json_text(document) + "\n",
+        outputs.html: page,
+        outputs.junit: tests,
+        outputs.sarif: results,
+        outputs.baseline: accepted,
+    }
 
 
 def _files_read(first: str, second: str) -> list[str]:

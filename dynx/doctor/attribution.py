@@ -30,7 +30,6 @@ from dynx.doctor.examination import (
     deepest_contact,
     max_change,
 )
-from dynx.doctor.lines import line_opcodes
 from dynx.doctor.mending import (
     Mending,
     Place,
@@ -45,6 +44,7 @@ from dynx.doctor.mending import (
 )
 from dynx.doctor.report import Effect
 from dynx.errors import DescriptionError
+from dynx.files.lines import line_opcodes
 from dynx.loaded import engine_of
 from dynx.model.xml.source import SourceElement, XmlSource
 from dynx.rules import CallingRule, Case, Detection, Remedy, Rule

@@ -16,9 +16,9 @@ import numpy as np
 from dynx.agreement.referee import Referee
 from dynx.agreement.tolerances import BAR
 from dynx.backends.solvability import singular_coordinates
-from dynx.doctor.lines import line_opcodes, lines_of
 from dynx.engines.silence import silence
 from dynx.errors import DescriptionError, DynxError, UnusableEngineError
+from dynx.files.lines import line_opcodes, lines_of
 from dynx.files.temporary import temporary_folder
 from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.model import Model

@@ -21,7 +21,7 @@ from dynx.files.links import refuse_links
 from dynx.files.reading import read_file
 from dynx.files.temporary import temporary_folder
 from dynx.files.writing import write_bytes
-from dynx.model.document_format import Format
+from dynx.model.document_format import SUFFIXES, Format
 from dynx.model.elements import Frame, Inertial, Joint, Pose
 from dynx.model.geometry import (
     Box,
@@ -42,13 +42,6 @@ from dynx.model.model import Model
 from dynx.model.sdf.writer import SdfWriter
 from dynx.model.urdf.writer import urdf_notes, urdf_text
 from dynx.spatial.scalar import Floats
-
-SUFFIXES: Mapping[Format, tuple[str, ...]] = {
-    "mjcf": (".xml", ".mjcf"),
-    "sdf": (".sdf",),
-    "urdf": (".urdf",),
-}
-"""Suffixes of the files of each format; the first is that of a file without a name."""
 
 _COPIED: Mapping[Format, tuple[str, ...]] = {
     "mjcf": MESH_SUFFIXES,

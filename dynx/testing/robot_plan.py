@@ -156,6 +156,6 @@ def _baseline(config: pytest.Config) -> Baseline | None:
         raise pytest.UsageError(f"--dynx-tolerance is {option.dynx_tolerance}; wanted it between 0 and 1")
     if option.dynx_baseline is None:
         return None
-    from dynx.doctor.formats.baseline import load_baseline
+    from dynx.doctor.formats.baseline import Baseline
 
-    return load_baseline(os.path.join(config.invocation_params.dir, option.dynx_baseline))
+    return Baseline.load(os.path.join(config.invocation_params.dir, option.dynx_baseline))

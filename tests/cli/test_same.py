@@ -200,3 +200,40 @@ def test_the_document_does_not_replace_a_file_that_is_read_or_mended(changed: Pa
         assert not out.exists()
     # A robot beside itself is no output.
     assert run(changed, changed, "--fix", out, "--json", tmp_path / "same.json").exit_code == 0
+
+
+def test_reports_are_written_and_a_baseline_accepts(changed: Path, tmp_path: Path) -> None:
+    names = {"--html": "r.html", "--sarif": "r.sarif", "--junit": "r.xml", "--json": "r.json"}
+    files = [word for option, name in names.items() for word in (option, tmp_path / name)]
+    known = tmp_path / "known.json"
+    result = run("ur5", changed, *files, "--write-baseline", known, "--quiet")
+    assert (result.exit_code, result.output) == (0, "")
+    for name in names.values():
+        assert "forearm_link" in (tmp_path / name).read_text(encoding="utf-8")
+    accepted = run("ur5", changed, "--baseline", known, "--github")
+    assert accepted.exit_code == 0
+    assert "::error" not in accepted.output
+    assert "2 known, 0 new, 0 gone" in accepted.output
+    text = changed.read_text(encoding="utf-8").replace('<mass value="8.393"/>', '<mass value="8.5"/>')
+    changed.write_text(text, encoding="utf-8")
+    worse = run("ur5", changed, "--baseline", known, "--github", "--html", tmp_path / "r.html")
+    assert worse.exit_code == 1
+    assert worse.output.count("::error") == 1
+    assert "new: link-inertial link 'upper_arm_link'" in worse.output
+    assert "2 known, 1 new, 0 gone" in worse.output
+
+
+@pytest.mark.parametrize("option", ["--html", "--sarif", "--junit", "--write-baseline"])
+def test_reports_replace_no_file_that_is_read(option: str, changed: Path) -> None:
+    before = changed.read_bytes()
+    result = run("ur5", changed, option, changed)
+    assert result.exit_code == 2
+    assert "would be overwritten" in result.output
+    assert changed.read_bytes() == before
+    assert run("ur5", changed, option, changed.parent / "none" / "r").exit_code == 2
+
+
+def test_json_and_annotations_need_two_outputs(changed: Path) -> None:
+    result = run("ur5", changed, "--github", "--json")
+    assert result.exit_code == 2
+    assert "--github and --json -" in result.output

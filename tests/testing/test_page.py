@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from dynx.cli.commands.comparison import doctor
+from dynx.cli.commands.comparison import doctor, same
 from dynx.testing import plugin
 from tests.page_blocks import ROOT, fenced
 
@@ -55,8 +55,12 @@ def workflow_commands() -> Iterator[str]:
 
 
 def own_hook() -> Any:
-    (hook,) = import_module("yaml").safe_load((ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))
-    return hook
+    return own_hooks()["dynx-doctor"]
+
+
+def own_hooks() -> dict[str, Any]:
+    text = (ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8")
+    return {hook["id"]: hook for hook in import_module("yaml").safe_load(text)}
 
 
 def commands() -> list[str]:
@@ -90,6 +94,21 @@ def test_commands_have_the_options() -> None:
         else:
             assert program in ("pip", "mkdir")
     assert programs == {"dynx", "pytest", "pip", "mkdir"}
+
+
+def test_the_page_on_pairs_has_the_action_and_the_hook() -> None:
+    page = (ROOT / "docs" / "same.md").read_text(encoding="utf-8")
+    (step,), hooks = map(import_module("yaml").safe_load, fenced("yaml", page))
+    action = import_module("yaml").safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+    assert step["with"].keys() <= action["inputs"].keys()
+    (shown,) = hooks["repos"][0]["hooks"]
+    own = own_hooks()[shown["id"]]
+    assert own["pass_filenames"] is False
+    taken = re.compile(own["files"])
+    assert all(taken.search(name) for name in shown["args"])
+    program, command = own["entry"].split()
+    assert program == "dynx"
+    same.make_context(command, [*shown["args"]])
 
 
 def test_extras_exist() -> None:

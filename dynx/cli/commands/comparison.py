@@ -18,6 +18,7 @@ from dynx.cli.shell.options import (
     model_options,
     name_list,
     one_of,
+    report_options,
     run_options,
     silent_option,
 )
@@ -143,21 +144,7 @@ def _rules_option(option: str, subject: str) -> Callable[[F], F]:
     "--in-place", is_flag=True, help="Overwrite the files that were read with the mended descriptions."
 )
 @json_option
-@click.option("--html", metavar="FILE", help="File for the reports as one self-contained HTML page.")
-@click.option("--junit", metavar="FILE", help="File for the reports as JUnit XML.")
-@click.option("--sarif", metavar="FILE", help="File for the reports as SARIF 2.1.0.")
-@click.option(
-    "--github",
-    is_flag=True,
-    help="Findings as annotations of GitHub Actions on standard output, without those in the baseline.",
-)
-@click.option(
-    "--baseline",
-    "baseline_path",
-    metavar="FILE",
-    help="File of known differences, as --write-baseline writes it: only other differences fail.",
-)
-@click.option("--write-baseline", metavar="FILE", help="File for all present differences, as a baseline.")
+@report_options
 @click.option(
     "--counterexamples",
     metavar="DIR",
@@ -216,6 +203,7 @@ def doctor() -> None:
     ".xml or .mjcf for MJCF. A file of that name is replaced, unless it is A, B or included by them.",
 )
 @json_option
+@report_options
 @silent_option
 @runs("dynx.cli.same:same")
 def same() -> None:
@@ -227,14 +215,15 @@ def same() -> None:
     Limits, joint dynamics, shapes, frames and names are listed apart from the verdict. So are contact filters
     and actuators where both files are MJCF, since URDF and SDF leave them open.
 
-    Exit code 0 if it is the same robot, 1 if not, mended or not, 2 if A or B cannot be used, or B is to be
-    mended and cannot be.
+    Exit code 0 if it is the same robot (or differs only as the baseline allows, or a baseline was written),
+    1 if not, mended or not, 2 if A or B cannot be used, or B is to be mended and cannot be.
 
     \b
     Examples:
       dynx same robot.urdf robot.xml
       dynx same old.urdf new.urdf --tolerance 1e-6 --fix mended.urdf
       dynx same g1 g1_with_hands --json
+      dynx same robot.urdf robot.xml --html report.html --baseline known.json --github
     """
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
 import click
 
-from dynx.cli.shell.exits import failure_of
 from dynx.cli.shell.output import check_writable, echo_json, make_folder, require_apart
+from dynx.cli.shell.reports import OutputFiles
 from dynx.doctor.formats import (
     baseline_document,
     github_annotations,
@@ -32,53 +32,10 @@ from dynx.model.loading import split_arguments
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 
-STDOUT = "-"
-
 
 @dataclass(frozen=True)
-class ReportFiles:
-    """The file of each format, or None; JSON can go to `STDOUT`."""
-
-    json: str | None = None
-    html: str | None = None
-    junit: str | None = None
-    sarif: str | None = None
-    baseline: str | None = None
-    github: bool = False
-    """Whether standard output has the findings as annotations of GitHub Actions, too."""
-
-    def check(self) -> None:
-        """Raise ArgumentError for a path that cannot be written, or that is given twice."""
-        if self.github and self.on_stdout:
-            raise ArgumentError("--github and --json - both write to standard output; give --json a file")
-        paths = [path for path in vars(self).values() if isinstance(path, str)]
-        for path in paths:
-            if path != STDOUT or path is not self.json:
-                check_writable(path)
-            if paths.count(path) > 1:
-                raise ArgumentError(f"two formats would be written to {path!r}")
-
-    def keep_apart(self, read: Iterable[str], mended: Iterable[str | None], baseline: str | None) -> None:
-        """Raise ArgumentError for a path that is also a robot, a mended file, or the baseline.
-
-        Only a new baseline can replace the baseline that was read, which accepts all new differences.
-        """
-        paths = [
-            path for path in (self.json, self.html, self.junit, self.sarif) if path not in (None, STDOUT)
-        ]
-        known = [] if baseline is None else [baseline]
-        every = paths if self.baseline is None else [*paths, self.baseline]
-        require_apart(every, read, "a robot that is read")
-        require_apart(paths, known, "the baseline")
-        targets = {os.path.realpath(path) for path in mended if path is not None}
-        for path in every:
-            if os.path.realpath(path) in targets:
-                raise ArgumentError(f"{shown(path, 300)} is also the file of a mended description")
-
-    @property
-    def on_stdout(self) -> bool:
-        """True if standard output carries JSON, so that tables go elsewhere."""
-        return self.json == STDOUT
+class ReportFiles(OutputFiles):
+    """Files of the reports of ``dynx doctor``."""
 
     def write(
         self,
@@ -94,20 +51,14 @@ class ReportFiles:
         below a directory. `command` is the command line that the HTML page shows.
         """
         texts: dict[str | None, Callable[[], str]] = {
-            None if self.on_stdout else self.json: lambda: (
-                json_text(results_document(reports, not_done, left_out)) + "\n"
-            ),
+            self.json: lambda: json_text(results_document(reports, not_done, left_out)) + "\n",
             self.html: lambda: html_page(reports, command=command, baseline=baseline, left_out=left_out),
             self.junit: lambda: junit_xml(reports, baseline, left_out),
             self.sarif: lambda: json_text(sarif_document(reports, baseline, not_done, left_out)) + "\n",
             self.baseline: lambda: self._baseline_text(reports),
         }
 
-        def write(path: str) -> None:
-            write_text(path, texts[path]())
-
-        errors = [failure_of(write, path) for path in texts if path is not None]
-        return [error for error in errors if error is not None]
+        return self.write_texts(texts)
 
     def echo(
         self,

@@ -14,9 +14,10 @@ from dynx.cli.doctor.files import ReportFiles, planned_targets, save_counterexam
 from dynx.cli.doctor.tables import show_many, show_one, show_summary
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line, short_line
 from dynx.cli.shell.output import command_line, console, counted
+from dynx.cli.shell.reports import show_comparison
 from dynx.cli.shell.run import TaskRun, carry_out
 from dynx.doctor.diagnosis import DEFAULT_SAMPLES
-from dynx.doctor.formats.baseline import Baseline, accepted_by, load_baseline
+from dynx.doctor.formats.baseline import Baseline, accepted_by
 from dynx.doctor.report import DoctorReport
 from dynx.doctor.task import DoctorTask, check_engines, examine, missing_engines, refused
 from dynx.errors import DynxError
@@ -57,7 +58,7 @@ def doctor(
     choices = tuple(checked_choices(choose).items())
     ignored_rules(ignore, only)  # Checked once, so that an error is not reported for every robot.
     check_engines(engines)
-    baseline = None if baseline_path is None else load_baseline(baseline_path)
+    baseline = None if baseline_path is None else Baseline.load(baseline_path)
     found = expand(robots)
     inputs = found.robots
     bases: tuple[Base | None, ...] = ("fixed", "floating") if base == "both" else (base,)
@@ -112,9 +113,6 @@ FIX_TOLERANCE = 1e-9
 """Largest effect that a mended file keeps by default: nobody merges changes of digits for less."""
 
 DoctorRun = TaskRun[DoctorTask, DoctorReport]
-
-_MAX_DIFFERENCES = 6
-"""Number of differences listed for each robot against a baseline."""
 
 
 class Conclusion:
@@ -222,22 +220,8 @@ class Conclusion:
                 out.print(f"note: {one_line(line)}", style="yellow")
         if self._baseline is not None:
             for report in reports:
-                self._show_comparison(out, report)
-
-    def _show_comparison(self, out: Console, report: DoctorReport) -> None:
-        assert self._baseline is not None
-        found = self._baseline.compare(report)
-        who = f"{short_line(report.robot)}, {report.base} base"
-        if found.known or found.new or found.vanished:
-            out.print(
-                f"{who}: {len(found.known)} known, {len(found.new)} new, {len(found.vanished)} gone",
-                style="bold red" if found.new else "bold",
-            )
-        for word, style, group in (("new", "red", found.new), ("gone", "green", found.vanished)):
-            for each in group[:_MAX_DIFFERENCES]:
-                out.print(f"  {word}: {each.place} ({', '.join(sorted(each.engines))})", style=style)
-            if len(group) > _MAX_DIFFERENCES:
-                out.print(f"  {word}: and {len(group) - _MAX_DIFFERENCES} more", style=style)
+                who = f"{short_line(report.robot)}, {report.base} base"
+                show_comparison(out, who, self._baseline.compare(report))
 
 
 def refusal(report: DoctorReport) -> str:

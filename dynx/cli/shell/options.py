@@ -277,6 +277,31 @@ json_option = click.option(
 )
 
 
+def report_options(command: F) -> F:
+    """Add the files of reports: ``--html``, ``--junit``, ``--sarif``, ``--github``, ``--baseline`` and
+    ``--write-baseline``."""
+    return stacked(
+        click.option("--html", metavar="FILE", help="File for the reports as one self-contained HTML page."),
+        click.option("--junit", metavar="FILE", help="File for the reports as JUnit XML."),
+        click.option("--sarif", metavar="FILE", help="File for the reports as SARIF 2.1.0."),
+        click.option(
+            "--github",
+            is_flag=True,
+            help="Findings as annotations of GitHub Actions on standard output, without those in the "
+            "baseline.",
+        ),
+        click.option(
+            "--baseline",
+            "baseline_path",
+            metavar="FILE",
+            help="File of known differences, as --write-baseline writes it: only other differences fail.",
+        ),
+        click.option(
+            "--write-baseline", metavar="FILE", help="File for all present differences, as a baseline."
+        ),
+    )(command)
+
+
 def engines_option(purpose: str) -> Callable[[F], F]:
     """Return ``--engine``, whose value `engines` is the names of several engines, or None."""
     return engine_option(

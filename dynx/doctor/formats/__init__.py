@@ -5,10 +5,10 @@ anything, so each format escapes them.
 """
 
 from dynx.doctor.formats.baseline import Baseline, baseline_document, read_baseline
-from dynx.doctor.formats.github import github_annotations
 from dynx.doctor.formats.html import html_page
 from dynx.doctor.formats.junit import junit_xml
 from dynx.doctor.formats.sarif import sarif_document
+from dynx.files.annotations import github_annotations
 
 __all__ = [
     "Baseline",

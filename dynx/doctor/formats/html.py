@@ -18,8 +18,8 @@ from dynx._version import __version__
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.baseline import Baseline
 from dynx.doctor.formats.causes import ROUNDING, causes, largest_error
-from dynx.doctor.lines import Opcode, line_opcodes, lines_of
 from dynx.doctor.report import DoctorReport
+from dynx.files.excerpts import TextChanges, excerpt_of, text_changes
 from dynx.files.pages import page_environment, page_text
 from dynx.loaded.difference import Deviation
 from dynx.model.expansion import left_out_note
@@ -258,95 +258,23 @@ def _word(value: Any) -> Any:
     return value
 
 
-# Excerpts of a robot's file around a line, and the lines that mending changed.
-
-
-SHOWN_LINES = 400
-"""Largest number of lines of the difference that are shown."""
-
-LONGEST_LINE = 400
-"""Largest number of characters of a line that are shown."""
-
-KINDS = {"+": "plus", "-": "minus", "@": "at"}
-
-
-@dataclass(frozen=True)
-class TextChanges:
-    """Unified difference between the file and the mended one; `lines` are (kind or None, text)."""
-
-    lines: tuple[tuple[str | None, str], ...]
-    added: int
-    removed: int
-    count: int
-    """Lines of the whole difference."""
-
-    @property
-    def left_out(self) -> int:
-        """Lines that are not shown."""
-        return self.count - len(self.lines)
-
-
 def changes(report: DoctorReport) -> TextChanges | None:
     """Compare the file with the mended one; None where nothing was mended."""
     if report.text is None or report.mended is None:
         return None
-    before, after = lines_of(report.text), lines_of(report.mended)
-    lines = list(_difference(before, after))
-    shown = tuple((KINDS.get(line[:1]), line) for line in lines[:SHOWN_LINES])
-    added, removed = (sum(line.startswith(sign) for line in lines) for sign in "+-")
-    return TextChanges(shown, added, removed, len(lines))
+    return text_changes(report.text, report.mended)
 
 
 def excerpt(report: DoctorReport, line: int | None, around: int = 2) -> list[tuple[int, str]]:
     """Return the lines about `line` with their numbers; none where the text or the line is unknown."""
     if report.text is None or line is None:
         return []
-    lines = lines_of(report.text if report.form is None else report.form.front + report.text)
-    return [
-        (number, lines[number - 1][:LONGEST_LINE] + (" ..." if len(lines[number - 1]) > LONGEST_LINE else ""))
-        for number in range(max(1, line - around), min(len(lines), line + around) + 1)
-    ]
+    return excerpt_of(report.text if report.form is None else report.form.front + report.text, line, around)
 
 
-def _difference(before: Sequence[str], after: Sequence[str], context: int = 2) -> Iterator[str]:
-    """Yield the lines of a unified difference."""
-    group: list[Opcode] = []
-    for code in [*line_opcodes(before, after), None]:
-        if code is not None and code[0] != "equal":
-            group.append(code)
-            continue
-        if group and (code is None or code[2] - code[1] > 2 * context):
-            yield from _hunk(before, after, group, context)
-            group = []
-
-
-def _hunk(
-    before: Sequence[str], after: Sequence[str], group: Sequence[Opcode], context: int
-) -> Iterator[str]:
-    """Yield changes that are near each other, with the lines around and between them."""
-    _, first, _, start, _ = group[0]
-    _, _, last, _, end = group[-1]
-    lead, trail = min(context, first), min(context, len(before) - last)
-    spans = (first - lead, last + trail, start - lead, end + trail)
-    yield f"@@ -{_range(*spans[:2])} +{_range(*spans[2:])} @@"
-    at = first - lead
-    for _, i, i_end, j, j_end in group:
-        yield from (f" {line}" for line in before[at:i])
-        yield from (f"-{line}" for line in before[i:i_end])
-        yield from (f"+{line}" for line in after[j:j_end])
-        at = i_end
-    yield from (f" {line}" for line in before[at : last + trail])
-
-
-def _range(first: int, end: int) -> str:
-    """Write a range of lines as `diff -u` does."""
-    count = end - first
-    return f"{first + 1}" if count == 1 else f"{first + (count > 0)},{count}"
-
-
-LIMITS = {"SHOWN_RULES": 6, "OPEN_PLACES": 2, "SHOWN_PLACES": 40, "OPEN_VALUES": 25, "OPEN_LINES": 80}
+LIMITS = {"SHOWN_RULES": 6, "OPEN_PLACES": 2, "SHOWN_PLACES": 40, "OPEN_VALUES": 25}
 """Largest numbers of rules in a robot's row of the overview, of expanded and of listed places of a cause,
-and of engine values and changed lines in an expanded table."""
+and of engine values in an expanded table."""
 
 LOWEST_BAR = -16
 """Power of ten at which the bar of an error starts: the last digit of a double; it is full at 100 %."""

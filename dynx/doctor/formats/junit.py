@@ -15,13 +15,10 @@ from dynx.doctor.formats.baseline import Baseline, PlacedDifference, accepted_by
 from dynx.doctor.formats.causes import RuleFindings, causes
 from dynx.doctor.report import DoctorReport, Finding
 from dynx.errors import located
-
-Element = ElementTree.Element
+from dynx.files.junit import KNOWN, Element, junit_failure, junit_result, junit_suite, junit_text
 
 _SHOWN_PLACES = 50
 """Largest number of places of one rule that are listed; SARIF and JSON have all."""
-
-KNOWN = "known: in the baseline"
 
 IGNORED = "ignored: no finding of this rule fails"
 
@@ -32,40 +29,22 @@ def junit_xml(
     reports: Iterable[DoctorReport], baseline: Baseline | None = None, left_out: Sequence[str] = ()
 ) -> str:
     """Make the document, in ASCII. The robots `left_out`, in xacro below a directory, are skipped tests."""
-    root = Element("testsuites", name="dynx doctor")
-    for report in reports:
-        root.append(_suite(report, baseline))
+    suites = [_suite(report, baseline) for report in reports]
     for robot in left_out:
-        skipped: list[tuple[str, Element | None]] = [(_CAN_BE_EXAMINED, _result("skipped", wording.LEFT_OUT))]
-        root.append(_suite_of(wording.name(robot), 0.0, skipped))
-    for key in ("tests", "failures", "errors", "skipped"):
-        root.set(key, str(sum(int(suite.get(key, "0")) for suite in root)))
-    ElementTree.indent(root)
-    body = ElementTree.tostring(root, encoding="us-ascii", xml_declaration=False).decode("ascii")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
+        skipped: list[tuple[str, Element | None]] = [
+            (_CAN_BE_EXAMINED, junit_result("skipped", wording.LEFT_OUT))
+        ]
+        suites.append(junit_suite(wording.name(robot), 0.0, skipped))
+    return junit_text("dynx doctor", suites)
 
 
 def _suite(report: DoctorReport, baseline: Baseline | None) -> Element:
     baseline = accepted_by(report, baseline)
     new = None if baseline is None else baseline.compare(report).new
     title = f"{wording.name(report.robot)}, {report.base} base"
-    suite = _suite_of(title, report.seconds, _cases(report, new))
+    suite = junit_suite(title, report.seconds, _cases(report, new))
     if report.unread_meshes:
         ElementTree.SubElement(suite, "system-out").text = f"not examined: {wording.unread_meshes(report)}"
-    return suite
-
-
-def _suite_of(title: str, seconds: float, cases: Iterable[tuple[str, Element | None]]) -> Element:
-    suite = Element("testsuite", name=title, time=f"{seconds:.3f}")
-    for name, result in cases:
-        # A dot would be read as the end of a package by some services.
-        case = ElementTree.SubElement(suite, "testcase", classname=title.replace(".", "_"), name=name)
-        if result is not None:
-            case.append(result)
-    outcomes = [child.tag for case in suite for child in case]
-    suite.set("tests", str(len(suite)))
-    for key, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
-        suite.set(key, str(outcomes.count(tag)))
     return suite
 
 
@@ -75,7 +54,7 @@ def _cases(
     """Yield the name of each test case with its result; None for one that passes."""
     if report.error is not None:
         message = wording.message(report.error.message, 2000)
-        yield _CAN_BE_EXAMINED, _result("error", message, report.error.type)
+        yield _CAN_BE_EXAMINED, junit_result("error", message, wording.name(report.error.type))
         return
     yield from _quantities(report, accepted=new is not None and not new)
     for cause in causes(report):
@@ -86,23 +65,23 @@ def _cases(
         known = new is not None and all(each.place.quantity != unexplained.quantity for each in new)
         message = KNOWN if known else f"{wording.unexplained(unexplained)}, and no rule accounts for it"
         title = f"unexplained: {quantity} of {wording.name(unexplained.engine)}"
-        yield title, _failure(message, known=known)
+        yield title, junit_failure(message, known=known)
 
 
 def _quantities(report: DoctorReport, *, accepted: bool) -> Iterator[tuple[str, Element | None]]:
     prefix = "known: " if accepted else ""
     if report.refusal is not None:
         message = f"{prefix}dynx refuses the file: {wording.name(report.refusal.message, 1000)}"
-        yield "dynx loads the file", _failure(message, known=accepted)
+        yield "dynx loads the file", junit_failure(message, known=accepted)
     for each in report.engines:
         if each.no_results is not None:
             message = f"{prefix}{each.engine}, {wording.refusal(each)}"
-            yield f"{each.engine} loads the file", _failure(message, known=accepted)
+            yield f"{each.engine} loads the file", junit_failure(message, known=accepted)
     for key in dict.fromkeys(key for each in report.engines for key in each.before):
         errors = {each.engine: each.before[key] for each in report.engines if key in each.before}
         far = [f"{engine} {wording.relative(e)}" for engine, e in errors.items() if not e <= report.tolerance]
         message = f"{prefix}relative error: {', '.join(far)}; tolerance {report.tolerance:g}"
-        yield f"{wording.quantity(key)} as loaded", _failure(message, known=accepted) if far else None
+        yield f"{wording.quantity(key)} as loaded", junit_failure(message, known=accepted) if far else None
 
 
 def _cause(cause: RuleFindings, report: DoctorReport, *, known: bool) -> Element:
@@ -117,20 +96,10 @@ def _cause(cause: RuleFindings, report: DoctorReport, *, known: bool) -> Element
         output.text = text
         return output
     if known:
-        return _failure(IGNORED if cause.rule in report.ignored else KNOWN, known=True)
-    return _result("failure", f"{wording.effect(cause.largest_effect)}: {cause.title}", cause.name, text)
-
-
-def _failure(message: str, *, known: bool) -> Element:
-    return _result("skipped" if known else "failure", message)
-
-
-def _result(tag: str, message: str, kind: str | None = None, text: str | None = None) -> Element:
-    element = Element(tag, message=message)
-    if kind is not None:
-        element.set("type", wording.name(kind))
-    element.text = text
-    return element
+        return junit_failure(IGNORED if cause.rule in report.ignored else KNOWN, known=True)
+    return junit_result(
+        "failure", f"{wording.effect(cause.largest_effect)}: {cause.title}", wording.name(cause.name), text
+    )
 
 
 def _place(finding: Finding, report: DoctorReport) -> str:

@@ -1,49 +1,34 @@
-"""SARIF 2.1.0 (OASIS standard), which code hosts show as annotations of the lines of a file.
+"""Findings as SARIF 2.1.0 (`dynx.files.sarif`).
 
 Results are the findings; level ``error`` where engines differ, ``warning`` where they differ by rounding,
 ``note`` otherwise. A file that cannot be examined is a result at the line of its error. A finding on both
-bases is one result. Fingerprints do not contain the line, so that a finding stays the same when text is
-inserted above it. Code hosts need a line for every result, a description and a help text for every rule, and
-paths relative to the repository.
+bases is one result.
 """
 
 from __future__ import annotations
 
-import hashlib
-import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path, PurePath
 from typing import Any
-from urllib.parse import quote
 
-from dynx._version import __version__
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.baseline import UNEXPLAINED, Baseline, Place, accepted_by
 from dynx.doctor.formats.causes import advice, catalogue_entry, causes, severity
 from dynx.doctor.report import DoctorReport, Finding, Unexplained
 from dynx.errors import located
-
-SCHEMA_URI = "https://json.schemastore.org/sarif-2.1.0.json"
+from dynx.files.sarif import (
+    IGNORED,
+    KNOWN,
+    MAX_DESCRIPTION,
+    physical_location,
+    sarif_result,
+    sarif_rule,
+    sarif_run,
+    suppression,
+)
 
 REFUSED = "refused"
 """Rule of a file that cannot be examined."""
-
-IGNORED = "the rule is ignored"
-"""Justification of a suppressed result whose rule the user ignores."""
-
-MAX_RESULTS = 25_000
-"""Largest number of results; GitHub rejects a run with more."""
-
-MAX_DESCRIPTION = 1000
-"""Largest number of characters of the description of a rule; GitHub reads 1024."""
-
-ROOT_ID = "%SRCROOT%"
-"""Name of the folder to which paths are relative."""
-
-_LEVELS = ("note", "warning", "error")
-
-_FINGERPRINT = "dynxFinding/v1"
 
 _OWN_RULES = {
     UNEXPLAINED: "Engines differ, and no rule of the catalogue accounts for it.",
@@ -62,44 +47,16 @@ def sarif_document(
     `not_done` names the robots that an interrupted run left out, `left_out` those in xacro below a directory.
     """
     reports = list(reports)
-    merged: dict[str, dict[str, Any]] = {}
-    for report in reports:
-        for result in _results(report, baseline):
-            key = result["partialFingerprints"][_FINGERPRINT]
-            old = merged.get(key)
-            if old is None or _severity(result) > _severity(old):
-                merged[key] = result
-    rules = _rules(reports)
-    numbers = {rule["id"]: number for number, rule in enumerate(rules)}
-    results = [{**result, "ruleIndex": numbers[result["ruleId"]]} for result in merged.values()]
     notes = [f"{wording.name(robot)} was not examined: the run was interrupted" for robot in not_done]
     notes += [f"{wording.name(robot)} {wording.LEFT_OUT}" for robot in left_out]
     notes += filter(None, [wording.ignored(*reports)])
-    if len(results) > MAX_RESULTS:
-        notes.append(f"{len(results) - MAX_RESULTS} of {len(results)} results were left out")
-        results = sorted(results, key=_severity, reverse=True)[:MAX_RESULTS]
-    root = os.path.join(_root(), "")
-    successful = not not_done and all(report.error is None for report in reports)
-    notifications: list[dict[str, Any]] = [{"level": "warning", "message": {"text": note}} for note in notes]
-    notifications += [_unread_meshes(report) for report in reports if report.unread_meshes]
-    invocation = {"executionSuccessful": successful, "toolExecutionNotifications": notifications}
-    return {
-        "$schema": SCHEMA_URI,
-        "version": "2.1.0",
-        "runs": [
-            {
-                "tool": {"driver": {"name": "dynx", "semanticVersion": __version__, "rules": rules}},
-                "columnKind": "unicodeCodePoints",
-                "originalUriBaseIds": {ROOT_ID: {"uri": f"{Path(root).as_uri()}/"}},
-                "invocations": [invocation],
-                "results": results,
-            }
-        ],
-    }
-
-
-def _severity(result: dict[str, Any]) -> int:
-    return _LEVELS.index(result["level"])
+    return sarif_run(
+        _rules(reports),
+        (result for report in reports for result in _results(report, baseline)),
+        notes,
+        [_unread_meshes(report) for report in reports if report.unread_meshes],
+        successful=not not_done and all(report.error is None for report in reports),
+    )
 
 
 def _results(report: DoctorReport, baseline: Baseline | None) -> Iterator[dict[str, Any]]:
@@ -123,9 +80,7 @@ def _results(report: DoctorReport, baseline: Baseline | None) -> Iterator[dict[s
             counts = isinstance(each, Unexplained) or each.effect is not None
             ignored = isinstance(each, Finding) and each.rule in report.ignored
             known = ignored or (counts and _key(each) not in new)
-            reason = IGNORED if ignored else "in the baseline"
-            justification = {"kind": "external", "justification": reason}
-            result["suppressions"] = [justification] if known else []
+            result["suppressions"] = suppression(None if not known else IGNORED if ignored else KNOWN)
         yield result
 
 
@@ -168,26 +123,14 @@ def _unexplained(report: DoctorReport, each: Unexplained, repetition: int) -> di
 def _result(
     report: DoctorReport, rule: str, level: str, message: str, line: int | None, *identity: str | None
 ) -> dict[str, Any]:
-    location = artifact_location(report)
-    parts = ["" if part is None else f"={part}" for part in (location["uri"], rule, *identity)]
-    digest = hashlib.sha256("\0".join(parts).encode("utf-8", "backslashreplace")).hexdigest()[:32]
-    if location["uri"].endswith(".xacro"):
-        line = None  # Lines are those of the URDF that it expands to.
-    region = {"startLine": max(line or 1, 1)}
-    return {
-        "ruleId": rule,
-        "level": level,
-        "message": {"text": message},
-        "locations": [{"physicalLocation": {"artifactLocation": location, "region": region}}],
-        "partialFingerprints": {_FINGERPRINT: digest},
-    }
+    return sarif_result(report.source or report.robot, rule, level, message, line, *identity)
 
 
 def _unread_meshes(report: DoctorReport) -> dict[str, Any]:
     """Return the notification of meshes that were not read, at the first of them."""
-    region = {"startLine": max(report.unread_meshes[0].line, 1)}
-    place = {"physicalLocation": {"artifactLocation": artifact_location(report), "region": region}}
-    return {"level": "note", "message": {"text": f"{wording.unread_meshes(report)}."}, "locations": [place]}
+    place = physical_location(report.source or report.robot, report.unread_meshes[0].line)
+    message = {"text": f"{wording.unread_meshes(report)}."}
+    return {"level": "note", "message": message, "locations": [{"physicalLocation": place}]}
 
 
 def _key(each: Finding | Unexplained | Place) -> tuple[str | None, ...]:
@@ -195,28 +138,6 @@ def _key(each: Finding | Unexplained | Place) -> tuple[str | None, ...]:
     if isinstance(each, Unexplained):
         return (UNEXPLAINED, None, each.joint, each.quantity)
     return (each.rule, each.link, each.joint, each.quantity if isinstance(each, Place) else None)
-
-
-def artifact_location(report: DoctorReport) -> dict[str, str]:
-    """Return the location of the file, relative to the root where it is below that."""
-    path = report.source or report.robot
-    if not os.path.isabs(path) and not os.path.exists(path):
-        return {"uri": quote(wording.name(path)), "uriBaseId": ROOT_ID}
-    absolute = os.path.abspath(path)
-    try:
-        relative = PurePath(os.path.relpath(absolute, _root())).as_posix()
-    except ValueError:  # another drive
-        return {"uri": Path(absolute).as_uri()}
-    if relative.startswith("../"):
-        return {"uri": Path(absolute).as_uri()}
-    # A name of a file may hold bytes that are no text.
-    return {"uri": quote(os.fsencode(relative)), "uriBaseId": ROOT_ID}
-
-
-def _root() -> str:
-    """Return the repository of the working directory, or that directory."""
-    folder = Path.cwd()
-    return str(next((each for each in (folder, *folder.parents) if (each / ".git").exists()), folder))
 
 
 def _rules(reports: list[DoctorReport]) -> list[dict[str, Any]]:
@@ -230,29 +151,18 @@ def _rules(reports: list[DoctorReport]) -> list[dict[str, Any]]:
         UNEXPLAINED: any(report.unexplained for report in reports),
         REFUSED: any(report.error is not None for report in reports),
     }
-    return found + [_described(each, each, _OWN_RULES[each]) for each in own if own[each]]
+    return found + [sarif_rule(each, each, _OWN_RULES[each]) for each in own if own[each]]
 
 
 def _rule(identity: str, name: str, message: str) -> dict[str, Any]:
     rule = catalogue_entry(identity)
     if rule is None:
-        return _described(identity, name, wording.name(message, MAX_DESCRIPTION))
+        return sarif_rule(identity, name, wording.name(message, MAX_DESCRIPTION))
     page = rule.page() or rule.title
     return {
-        **_described(identity, name, rule.title),
+        **sarif_rule(identity, name, rule.title),
         "fullDescription": {"text": f"{rule.title} {rule.advice}".strip()[:MAX_DESCRIPTION]},
         "help": {"text": page, "markdown": page},
         "defaultConfiguration": {"level": "error" if rule.kind == "difference" else "note"},
         "properties": {"tags": ["urdf", rule.kind, *sorted(rule.engines)]},
-    }
-
-
-def _described(identity: str, name: str, text: str) -> dict[str, Any]:
-    described = {"text": text[:MAX_DESCRIPTION] or wording.name(identity)}
-    return {
-        "id": wording.name(identity),
-        "name": wording.name(name),
-        "shortDescription": described,
-        "fullDescription": described,
-        "help": described,
     }

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from dynx.doctor.diagnosis import compare_as_loaded
 from dynx.doctor.formats import html_page, read_baseline
 from dynx.doctor.formats.html import ALL_STEPS, SAME, Step, excerpt, step_of, template_environment
-from dynx.doctor.lines import lines_of
 from dynx.doctor.report import DoctorReport
+from dynx.files.lines import lines_of
 from dynx.rules.registry import all_rules
 from tests.doctor.formats.reports import HOSTILE, TEXT, alike, differing, hostile, refused
 from tests.files.page import Page, contrast

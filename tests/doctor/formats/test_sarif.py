@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.formats import Baseline, sarif, sarif_document
+from dynx.doctor.formats import Baseline, sarif_document
 from dynx.doctor.formats.baseline import differences
 from dynx.doctor.report import DoctorReport, Effect, Unexplained
 from dynx.doctor.task import DoctorTask, examine
@@ -182,7 +182,7 @@ def test_two_findings_at_one_place_are_two_results() -> None:
 
 
 def test_the_severe_results_remain_where_there_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sarif, "MAX_RESULTS", 3)
+    monkeypatch.setattr("dynx.files.sarif.MAX_RESULTS", 3)
     document = sarif_document([differing()])
     assert [each["level"] for each in document["runs"][0]["results"]] == ["error"] * 3
     [note] = document["runs"][0]["invocations"][0]["toolExecutionNotifications"]

@@ -11,13 +11,13 @@ from collections.abc import Mapping
 from typing import Any
 from urllib.parse import unquote
 
-from dynx.doctor.formats.sarif import IGNORED
+from dynx.files.sarif import IGNORED
 
 _COMMANDS = {"error": "error", "warning": "warning", "note": "notice"}
 
 
 def github_annotations(sarif: Mapping[str, Any]) -> list[str]:
-    """Return the command of each result of a document of `sarif_document`, but those in the baseline.
+    """Return the command of each result of a SARIF document (`sarif_run`), but those in the baseline.
 
     The findings of ignored rules are counted in one notice.
     """

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor import lines
-from dynx.doctor.formats.html import _difference
-from dynx.doctor.lines import line_opcodes
+from dynx.files import lines
+from dynx.files.excerpts import _difference
+from dynx.files.lines import line_opcodes
 
 texts = st.lists(st.sampled_from(["a", "b", "c", "", "link 1", "link 2", "link 3"]), max_size=40)
 
