@@ -11,7 +11,6 @@ from dynx.model import Model
 from dynx.model.mechanism import Body, BodyFrame, Mechanism, build_mechanism
 from dynx.rbd.kinematics import frame_placements
 from dynx.rbd.rnea import inverse_dynamics
-from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
 
@@ -58,6 +57,8 @@ class Values:
 
 def values(model: Model, states: Model) -> Values:
     """Evaluate a model at random states within the limits of the model `states`."""
+    from dynx.reference.backend import ReferenceBackend  # rarely needed
+
     q, v, a = _states(model, states)
     backend = ReferenceBackend(model)
     return Values(backend.forward_kinematics(q), backend.mass_matrix(q), backend.inverse_dynamics(q, v, a))

@@ -674,7 +674,7 @@ class _Inertias:
             if mine.inertial is None:
                 return None
             place = inverse(T) @ inverse(D) @ self._fit.ours.link_pose(each.mine)
-            if float(np.max(np.abs(rounded(place - np.eye(4))))) < SNAP:
+            if float(np.max(np.abs(rounded(place - np.eye(4, dtype=int))))) < SNAP:
                 return mine.inertial
             origin = place @ decimals_of_pose(mine.inertial.origin)
             return replace(mine.inertial, origin=nearest_pose(origin, mine.inertial.origin), line=line)
