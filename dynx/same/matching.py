@@ -137,8 +137,12 @@ class Matching:
         for number, D in enumerate(bases):
             limit = found[MAX_BASES - 1][0] if len(found) >= MAX_BASES else np.inf
             found = sorted([*found, (self._followed(ROOT, ROOT, D, limit), number, D)], key=_first_two)
-            # The frame as it is stays in the choice: below a misplaced joint all differs, in any frame.
-            found = [*found[:MAX_BASES], *(entry for entry in found[MAX_BASES:] if entry[1] == 0)]
+            # The frame as it is stays in the choice, and the first in which the base itself fits: below a
+            # misplaced joint all differs, in any frame.
+            kept = [entry for entry in found[MAX_BASES:] if entry[1] == 0]
+            fitting = (entry for entry in found if self._own_cost(ROOT, ROOT, entry[2]) == 0.0)
+            kept += [entry for entry in islice(fitting, 1) if entry[1] and entry not in found[:MAX_BASES]]
+            found = [*found[:MAX_BASES], *kept]
             if found[0][0] == 0.0:
                 break
         if found[0][0] == 0.0 or found[0][1] == 0:
