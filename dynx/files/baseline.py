@@ -111,7 +111,9 @@ class KnownDifferences:
         for each in self.known:
             allowed[each.place] = allowed.get(each.place, frozenset()) | each.engines
         every = list(found)
-        new, known, left_out = [], [], []
+        new: list[PlacedDifference] = []
+        known: list[PlacedDifference] = []
+        left_out: list[PlacedDifference] = []
         for each in every:
             accepted = each.place in allowed and each.engines <= allowed[each.place]
             (left_out if each.place.rule in ignored else known if accepted else new).append(each)

@@ -223,7 +223,7 @@ def same() -> None:
       dynx same robot.urdf robot.xml
       dynx same old.urdf new.urdf --tolerance 1e-6 --fix mended.urdf
       dynx same g1 g1_with_hands --json
-      dynx same robot.urdf robot.xml --html report.html --baseline known.json --github
+      dynx same robot.urdf robot.xml --html report.html --baseline known.json
     """
 
 

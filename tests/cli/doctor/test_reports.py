@@ -128,7 +128,7 @@ def test_a_document_of_agree_that_cannot_be_written_leaves_the_table(
         raise ArgumentError(f"{path} cannot be written: no space left")
 
     monkeypatch.setattr("dynx.cli.shell.output.write_text", full)
-    monkeypatch.setattr("dynx.cli.doctor.files.write_text", full)
+    monkeypatch.setattr("dynx.cli.shell.reports.write_text", full)
     engines = ["--backends", "pinocchio"] if as_loaded else ["--backends", "reference"]
     command = ["agree", "pendulum", *engines, "--samples", "1", "--json", str(tmp_path / "x.json")]
     result = CliRunner().invoke(cli, [*command, *["--as-loaded"] * as_loaded])
