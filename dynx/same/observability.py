@@ -9,11 +9,12 @@ vanishes there vanishes everywhere, with probability 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.model.mechanism import ROOT, BodyFrame, Mechanism
 from dynx.rbd.base_parameters import align_frames, split_inertia
@@ -29,6 +30,8 @@ STATES, SEED = 24, 0
 
 NULL = 1e-8
 """Singular value, relative to columns of length 1, below which a direction is in the null space."""
+
+Ints = NDArray[np.int64]
 
 Differences = Mapping[int, RigidInertia]
 """Difference of the inertia of some bodies, by the number of the body."""
@@ -50,6 +53,8 @@ class Observability:
         self._aligned = align_frames(self._mechanism)
         inertias = [self._aligned.root, *(body.inertia for body in self._aligned.bodies)]
         self._frames = {frame.body: (frame.R, frame.p) for frame in self._aligned.frames}
+        self._reduced_bodies: list[int] = []
+        self._reduced: Floats = np.zeros((0, 0))
         self._own = {number: float_inertia(inertia) for number, inertia in enumerate(inertias, ROOT)}
 
     def regrouped(self, body: int, difference: RigidInertia) -> Differences:
@@ -88,8 +93,7 @@ class Observability:
         bodies = list(inertias)
         parameters = np.concatenate([parameters_from_inertia(inertias[body]) for body in bodies])
         scales = np.concatenate([self._scales(body) for body in bodies])
-        numbers = np.concatenate([np.arange(10) + 10 * (body + 1) for body in bodies])
-        columns = self._regressor[:, numbers] * scales
+        columns = self._columns(bodies) * scales
         lengths = np.linalg.norm(columns, axis=0)
         seen = lengths > NULL * float(np.max(lengths, initial=0.0))
         if not seen.any():
@@ -116,10 +120,18 @@ class Observability:
         moment = float(np.max(np.abs(own.rotational_inertia))) or mass * length**2
         return np.array([mass] + [np.sqrt(mass * moment)] * 3 + [moment] * 6)
 
+    def _columns(self, bodies: Sequence[int]) -> Floats:
+        """Return the regressor of some bodies at all states, (m, 10 n), up to an orthogonal transform that
+        leaves few rows: of all bodies that were wanted so far, since subsets of them are wanted next."""
+        if not set(bodies) <= set(self._reduced_bodies):
+            self._reduced_bodies = list(dict.fromkeys([*self._reduced_bodies, *bodies]))
+            wanted = self._regressor[:, _columns_of(self._reduced_bodies)]
+            self._reduced = np.linalg.qr(wanted, mode="r")
+        return self._reduced[:, _columns_of([self._reduced_bodies.index(body) - 1 for body in bodies])]
+
     @cached_property
     def _regressor(self) -> Floats:
-        """The regressor of all aligned bodies, the root first, at all states: (m, 10 n), where an orthogonal
-        transform has left at most as many rows as columns."""
+        """The regressor of all aligned bodies, the root first, at all states: (m, 10 n)."""
         aligned = self._aligned
         frames = [frame.name for frame in aligned.frames]
         model, rng = self._skeleton.model, np.random.default_rng(SEED)
@@ -134,7 +146,12 @@ class Observability:
         bodies = range(ROOT, len(aligned.bodies))
         numbers = [frames.index(str(body)) for body in bodies]
         Y = inertial_regressor_at(aligned, q, v, a, numbers)
-        return np.asarray(np.linalg.qr((S.T @ Y).reshape(-1, 10 * len(bodies)), mode="r"))
+        return np.asarray((S.T @ Y).reshape(-1, 10 * len(bodies)))
+
+
+def _columns_of(bodies: Sequence[int]) -> Ints:
+    """Return the numbers of the columns of bodies, of which the root, number -1, has the first."""
+    return np.concatenate([np.arange(10) + 10 * (body + 1) for body in bodies])
 
 
 def _coupled_q(mechanism: Mechanism, q: Floats) -> Floats:

@@ -32,7 +32,7 @@ RULES: dict[str, str] = {
 class SameFinding:
     """A difference of two descriptions at an element of each; `level` is ``note`` apart from the verdict.
 
-    `size` is relative to the natural magnitude, infinite for a joint without counterpart.
+    `size` is relative to the scale of what differs, infinite for a joint without counterpart.
     """
 
     rule: str
