@@ -18,8 +18,10 @@ from dynx.rules.mjcf import (
     BodyInText,
     bodies_in_text,
     decimals,
+    found_in,
     inertial_text,
     mjcf_text,
+    parts_of_bodies,
     quaternion_text,
     with_defaults,
 )
@@ -550,3 +552,143 @@ def _joints_in_text(case: Case, document: MjcfText) -> Iterator[tuple[BodyInText
         for joint in body.children("joint"):
             if with_defaults(document, joint, body.childclass).get("type") != "free":
                 yield body, joint
+
+
+class IncludeOfMjcf(Rule):
+    """DX613 include-of-mjcf: The file includes another one, which Pinocchio and PyBullet leave out.
+
+    ``<include file="robot.xml"/>`` stands for what the other file holds. Scenes include their robot so.
+
+    - MuJoCo 4.0 and Drake 1.51 read the other file.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) leave the element out. The
+      robot lacks its bodies, or there is none. PyBullet prints "unknown field 'include'".
+
+    What to do: load the file of the robot itself, or write one file: ``mj_saveLastXML`` does so, and ``dynx
+    convert --to mjcf``. ``dynx doctor --fix`` does not change it.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    stated_refusal = True
+    advice = "Load the file of the robot itself, or write one file (dynx convert --to mjcf)."
+    engines = measured_on("pinocchio", "pybullet")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the includes of the file."""
+        for element in case.source.root.walk():
+            if element.tag == "include":
+                name = element.attributes.get("file", "")
+                yield Detection(None, None, element.line, f"the file includes {shown(name, 200)}")
+
+
+class ModelWithoutName(EditingRule):
+    """DX614 model-without-name: The model has no name, for which Drake refuses the file.
+
+    The attribute ``model`` of ``<mujoco>`` is optional.
+
+    - MuJoCo 4.0 calls the model ``MuJoCo Model``; Pinocchio 4.1 and PyBullet 3.2.7 need no name.
+    - Drake 1.51 refuses the file: "Your robot must have a name attribute or a model name must be specified".
+
+    What to do: write a name. ``dynx doctor --fix`` writes ``model="robot"``.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Write the attribute model of <mujoco>."
+    engines = measured_on("drake")
+    changed = 'wrote model="robot"'
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield a root without a name."""
+        root = case.source.root
+        if not root.attributes.get("model"):
+            detection = Detection(None, None, root.line, "the model has no name")
+            yield Correction(detection, (case.source.attribute_edit(root, "model", "robot"),))
+
+
+class WorldWithoutBody(Rule):
+    """DX615 world-without-body: The world has no body, for which Pinocchio refuses the file.
+
+    A file of a floor, a table or of settings has geoms in ``<worldbody>``, or nothing.
+
+    - MuJoCo 4.0 and Drake 1.51 read a world in which nothing moves; so does PyBullet 3.2.7 where there is a
+      geom.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) raises "No such node (body)" or "no body found in parsed tree".
+
+    What to do: nothing, if nothing should move. Load the file with the robot, which includes this one.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    stated_refusal = True
+    advice = "Load the file that includes this one."
+    engines = measured_on("pinocchio")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the world without a body."""
+        document = mjcf_text(case)
+        if next(parts_of_bodies(document, "body"), None) is None:
+            yield Detection(None, None, case.source.root.line, "the world has no body")
+
+
+class MeshOfMjcfNotObj(Rule):
+    """DX616 mesh-of-mjcf-not-obj: A mesh is no OBJ file, for which Drake refuses the file.
+
+    MuJoCo reads meshes in STL, OBJ and its own format MSH.
+
+    - MuJoCo 4.0 reads the mesh; Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) load
+      the robot without it.
+    - Drake 1.51 refuses the file, also where no geom uses the mesh: "Drake's MuJoCo parser currently only
+      supports mesh files in .obj format".
+
+    What to do: convert the meshes to OBJ, or the robot to URDF (``dynx convert --to urdf``). ``dynx doctor
+    --fix`` does not change the file.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    stated_refusal = True
+    advice = "Convert the meshes to OBJ."
+    engines = measured_on("drake")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield meshes of other formats."""
+        document = mjcf_text(case)
+        for mesh, file, _ in _mesh_assets(document):
+            if not file.lower().endswith(".obj"):
+                yield found_in(document, mesh, f"the mesh {shown(file, 200)} is no OBJ file")
+
+
+class MeshOfMjcfNotFound(Rule):
+    """DX617 mesh-of-mjcf-not-found: The file of a mesh is not where the model says.
+
+    ``<mesh file="arm.obj"/>`` is looked for in ``meshdir`` of the compiler, from the folder of the file.
+
+    - MuJoCo 4.0 refuses the model, also where no geom uses the mesh: "Error opening file". Drake 1.51 refuses
+      it too: "The mesh asset could not be found".
+    - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) load the robot without it.
+
+    dynx needs the mesh where a mass follows from it.
+
+    What to do: put the file there, or correct the path, capitals included.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    stated_refusal = True
+    advice = "Put the file there, or correct the path, capitals included."
+    engines = measured_on("mujoco", "drake")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield meshes that are not found."""
+        document = mjcf_text(case)
+        for mesh, _, reason in _mesh_assets(document):
+            if reason:
+                yield found_in(document, mesh, reason)
+
+
+def _mesh_assets(document: MjcfText) -> Iterator[tuple[Element, str, str]]:
+    """Yield each mesh that names a file, with that name and the reason why it is not found, mostly empty."""
+    for mesh in document.sections("asset"):
+        file = mesh.attributes.get("file", "")
+        if mesh.tag == "mesh" and file:
+            yield mesh, file, document.find(mesh, document.compiler_of(mesh).mesh_folder, file)[1]
