@@ -378,6 +378,11 @@ def unbound_names(code: str) -> set[str]:
     return loaded - stored - set(dir(builtins)) - {"__name__", "__file__", "__annotations__"}
 
 
+def _is_named(block: Block, name: str) -> bool:
+    """Return whether a word of the command line names a block: the begin of its page's path, or its place."""
+    return block.page.startswith(name) or str(block) == name
+
+
 def main() -> int:
     """Run the blocks of the pages named, and return 1 if one is wrong."""
     parser = argparse.ArgumentParser(description="Run the blocks of pages, each alone.")
@@ -388,13 +393,13 @@ def main() -> int:
     given = parser.parse_args()
     all_blocks = [block for page in PAGES for block in blocks_of(page)]
     for name in given.pages:
-        if not any(str(block).startswith(name) for block in all_blocks):
+        if not any(_is_named(block, name) for block in all_blocks):
             parser.error(f"no page has a path that begins with {name!r}, and no block is at this line")
     blocks = [
         block
         for block in all_blocks
         if block.language in given.only
-        and (not given.pages or block.page.startswith(tuple(given.pages)) or str(block) in given.pages)
+        and (not given.pages or any(_is_named(block, name) for name in given.pages))
     ]
     if "DYNX_CACHE_DIR" not in os.environ:
         cache_folder = tempfile.TemporaryDirectory(prefix="dynx-blocks-")

@@ -188,12 +188,13 @@ def _film(
         def draw() -> None:
             if next(steps) % skip == 0:
                 pictures.append(env.render())
+                advance(done, f"episodes, {counted(len(pictures), 'picture')}")
 
-        for k in range(episodes):
-            total, length = _episode(policy, env, seed + k, deterministic, draw)
-            advance(k + 1, "episodes")
+        for done in range(episodes):
+            total, length = _episode(policy, env, seed + done, deterministic, draw)
+            advance(done + 1, f"episodes, {counted(len(pictures), 'picture')}")
             if not quiet:
-                log(f"episode {k + 1} of {episodes}: return {total:.5g} in {counted(length, 'step')}")
+                log(f"episode {done + 1} of {episodes}: return {total:.5g} in {counted(length, 'step')}")
     write_pictures(path, pictures, skip / rate)
     if not quiet:
         console().print(f"wrote {one_line(path)}")
