@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dynx.argument_types import checks_types
+from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import is_real, whole_number
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.evaluation import MAX_EPISODES, Evaluation, evaluate
@@ -53,10 +55,11 @@ class Progress:
 @checks_types
 @dataclass(frozen=True)
 class Schedule:
-    """What a run does beside training, which does not change what is learned.
+    """What a run does beside training, and the return at which it ends early.
 
     Steps between checkpoints and between evaluations (None: `CHECKPOINTS_PER_RUN` and `EVALUATIONS_PER_RUN`
     in all), episodes of an evaluation, threads of PyTorch, and whether curves are written for TensorBoard.
+    The first evaluation with a mean return of at least `target_return` ends the training; None: none does.
     """
 
     checkpoint_every: int | None = None
@@ -64,6 +67,7 @@ class Schedule:
     episodes: int = 10
     threads: int = 1
     tensorboard: bool = False
+    target_return: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("checkpoint_every", "evaluate_every"):
@@ -72,6 +76,9 @@ class Schedule:
                 whole_number(name, steps, 1)
         whole_number("episodes", self.episodes, 1, MAX_EPISODES)
         whole_number("threads", self.threads, 1, MAX_THREADS)
+        target = self.target_return
+        if target is not None and not (is_real(target) and math.isfinite(target)):
+            raise ArgumentError(f"target_return is {shown(target)}; wanted a finite number, or None")
 
     def distances(self, steps: int) -> tuple[int, int]:
         """Return the steps between checkpoints and between evaluations of a run of `steps`."""
@@ -109,7 +116,10 @@ class Learning:
             log_to(algorithm, str(place / TENSORBOARD))
 
     def learn(self, steps: int) -> None:
-        """Take at least this number of further steps; the last policy is a checkpoint."""
+        """Take at least this number of further steps, or fewer if an evaluation reaches the target return.
+
+        The last policy is a checkpoint.
+        """
         total = self._spec.steps
         every, judge_every = self._schedule.distances(total)
         observer = Observer(
@@ -137,14 +147,16 @@ class Learning:
     def _add_checkpoint(self) -> None:
         self._checkpoints.add(self._policy())
 
-    def _judge(self) -> None:
-        """Evaluate the policy; keep it if it is the best so far."""
+    def _judge(self) -> bool:
+        """Evaluate the policy; keep it if it is the best so far. Return whether it has the target return."""
         policy = self._policy()
         self._last = found = evaluate(policy, self._judged, self._schedule.episodes, EVALUATION_SEED)
         self._evaluations.add(evaluation_line(policy.steps_done, found))
         if found.mean > self._best:
             self._best = found.mean
             policy.save(self._place / BEST)
+        target = self._schedule.target_return
+        return target is not None and found.mean >= target
 
     def _report(self, mean_return: float | None) -> None:
         """Add a point to the curve, and tell the caller of the run."""

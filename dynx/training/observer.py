@@ -12,24 +12,25 @@ from dynx.training.library import BaseCallback
 class Observer(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not followed
     """Calls each action after its number of steps, when no update of the weights is half done.
 
-    `actions` are called without arguments; `report` with the mean return of the last episodes, or None before
-    the first has ended. The first call of each is after a full distance, so that nothing is done at the
-    start.
+    `actions` are called without arguments; one that returns True ends the training, with the weights as they
+    are. `report` is called with the mean return of the last episodes, or None before the first has ended. The
+    first call of each is after a full distance, so that nothing is done at the start.
     """
 
     def __init__(
         self,
         distances: Mapping[str, int],
-        actions: Mapping[str, Callable[[], object]],
-        report: Callable[[float | None], object],
+        actions: Mapping[str, Callable[[], bool | None]],
+        report: Callable[[float | None], None],
     ) -> None:
         super().__init__()
         self._distances = distances
-        self._actions: dict[str, Callable[[], object]] = {
+        self._actions: dict[str, Callable[[], bool | None]] = {
             **actions,
             "report": lambda: report(self._mean_return()),
         }
         self._last: dict[str, int] = {}
+        self._ended = False
 
     def _on_training_start(self) -> None:
         self._last = dict.fromkeys(self._distances, self.model.num_timesteps)
@@ -39,10 +40,11 @@ class Observer(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not 
         for name, distance in self._distances.items():
             if self.model.num_timesteps - self._last[name] >= distance:
                 self._last[name] = self.model.num_timesteps
-                self._actions[name]()
+                self._ended |= self._actions[name]() is True
 
     def _on_step(self) -> bool:
-        return True
+        # False ends the training before the next update.
+        return not self._ended
 
     def _mean_return(self) -> float | None:
         ended = [float(each["r"]) for each in self.model.ep_info_buffer or ()]

@@ -59,7 +59,8 @@ def train(
     """Train a policy, and judge it over `final_episodes` whole episodes.
 
     The folder gets `RUN`, checkpoints, `EVALUATIONS` and `CURVE` (a JSON document in each line), `BEST` (the
-    policy of the best evaluation) and `FINAL`. A run that was ended, even by a power failure, goes on with
+    policy of the best evaluation) and `FINAL`. ``Schedule(target_return=...)`` ends the training at the first
+    evaluation with this mean return. A run that was ended, even by a power failure, goes on with
     `resume` from its last checkpoint: weights, state of the optimizer, schedules, scaling and replay buffer
     are those of the checkpoint; the environments begin new episodes. A run of an earlier dynx goes on with
     the joint dynamics that its environments had (`of_earlier_version`). A finished run is only judged, unless

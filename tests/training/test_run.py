@@ -71,6 +71,29 @@ def test_a_finished_run_is_only_judged_when_it_is_resumed(tmp_path: Path) -> Non
     assert all(bool((before[key] == after[key]).all()) for key in before)
 
 
+@pytest.mark.parametrize("algorithm", ["ppo", "dqn"])
+def test_a_run_ends_at_the_first_evaluation_with_the_target_return(algorithm: str, tmp_path: Path) -> None:
+    given = SMALL if algorithm == "ppo" else {"learning_starts": 16, "buffer_size": 500}
+    spec = small_run(algorithm=algorithm, hyperparameters=given)
+    often = {"checkpoint_every": 1000, "evaluate_every": 64, "episodes": 2}
+    # Each step of the task has a reward of 1.
+    done = train(spec, tmp_path / "run", schedule=Schedule(**often, target_return=2.0), final_episodes=1)
+    judged = read_lines(tmp_path / "run" / "evaluations.jsonl")
+    assert len(judged) == 1
+    assert 64 <= judged[0]["steps"] <= done.policy.steps_done < 128
+    final, best = (weights(tmp_path / "run" / name) for name in ("final.zip", "best.zip"))
+    assert all(bool((final[key] == best[key]).all()) for key in final)
+    again = train(spec, tmp_path / "run", resume=True, schedule=Schedule(**often), final_episodes=1)
+    assert again.resumed_at == done.policy.steps_done
+    assert 256 <= again.policy.steps_done < 256 + 32  # whole rollouts from there
+
+
+@pytest.mark.parametrize("wrong", ["a", True, float("nan"), float("inf"), [1.0]])
+def test_a_wrong_target_return_is_refused(wrong: Any) -> None:
+    with pytest.raises(ArgumentError, match="target_return"):
+        Schedule(target_return=wrong)
+
+
 def test_a_finished_run_goes_on_with_more_steps(tmp_path: Path) -> None:
     linear = {**SMALL, "learning_rate": "lin_0.001"}
     train(small_run(128, hyperparameters=linear), tmp_path, schedule=OFTEN, final_episodes=1)

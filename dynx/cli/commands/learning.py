@@ -192,6 +192,12 @@ def distance() -> None:
         help="Steps between evaluations (default: a tenth of all).",
     ),
     click.option(
+        "--target-return",
+        type=float,
+        metavar="RETURN",
+        help="Mean return of an evaluation at which training ends early (default: none).",
+    ),
+    click.option(
         "--episodes",
         type=click.IntRange(min=1),
         default=100,

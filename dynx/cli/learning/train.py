@@ -54,6 +54,7 @@ def train(
     resume: bool,
     checkpoint_every: int | None,
     evaluate_every: int | None,
+    target_return: float | None,
     episodes: int,
     threads: int,
     tensorboard: bool,
@@ -72,7 +73,13 @@ def train(
     resumes_folder = resume and out is not None and task is None and named_task is None
     name = None if resumes_folder else task_id(one_task(task, named_task))
     given = {name: json_value(word) for name, word in values}
-    schedule = Schedule(checkpoint_every, evaluate_every, threads=threads, tensorboard=tensorboard)
+    schedule = Schedule(
+        checkpoint_every,
+        evaluate_every,
+        threads=threads,
+        tensorboard=tensorboard,
+        target_return=target_return,
+    )
     base = Path(out if out is not None else _folder_of(str(name), engine, algorithm or ALGORITHM))
     known = _known_runs(base) if resume else {}
     if name is None and not known:
