@@ -153,7 +153,7 @@ def bench(robot: str, *options: str) -> tuple[str, ...]:
 PARTS = {
     "calls": Part((("benchmarks.call_overhead",),), calls_table),
     "batches": Part(
-        tuple(bench(robot, "--backends", "compiled", *BATCHES) for robot in ("ur5", "panda", "talos")),
+        tuple(bench(robot, "--engine", "compiled", *BATCHES) for robot in ("ur5", "panda", "talos")),
         batches_table,
         json=True,
     ),

@@ -29,6 +29,11 @@ def variables(step: dict[str, Any], **inputs: str) -> dict[str, str]:
     }
 
 
+def test_no_extra_of_dynx_has_a_marker_which_the_build_would_drop() -> None:
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert not re.findall(r'"dynx-robotics\[[^"]*;[^"]*"', text)
+
+
 @pytest.fixture
 def runner(tmp_path: Path) -> dict[str, str]:
     """Environment of a runner whose virtual environment has this dynx."""
