@@ -75,7 +75,7 @@ def test_a_finished_run_is_only_judged_when_it_is_resumed(tmp_path: Path) -> Non
 def test_a_run_ends_at_the_first_evaluation_with_the_target_return(algorithm: str, tmp_path: Path) -> None:
     given = SMALL if algorithm == "ppo" else {"learning_starts": 16, "buffer_size": 500}
     spec = small_run(algorithm=algorithm, hyperparameters=given)
-    often = {"checkpoint_every": 1000, "evaluate_every": 64, "episodes": 2}
+    often: dict[str, Any] = {"checkpoint_every": 1000, "evaluate_every": 64, "episodes": 2}
     # Each step of the task has a reward of 1.
     done = train(spec, tmp_path / "run", schedule=Schedule(**often, target_return=2.0), final_episodes=1)
     judged = read_lines(tmp_path / "run" / "evaluations.jsonl")
