@@ -32,8 +32,13 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
     "DX512": {"DX304": "a follower that leaves its limits follows"},
     "DX601": {"DX610": "PyBullet computes the mass from the shapes, too"},
     "DX608": {"DX610": "the body that has the frame has other parts than a box"},
+    "DX609": {
+        "DX618": "the first body is a table that is fixed",
+        "DX619": "the first body is a table that is fixed",
+    },
     "DX611": {"DX610": "the moments of no box are those of the file"},
     "DX613": {"DX610": "a body of another file is not looked at for a box"},
+    "DX618": {"DX619": "the base that is fixed floats in PyBullet"},
     "DX708": {"DX711": "what is included is named by a model"},
     "DX711": {"DX708": "a file is included"},
 }

@@ -36,6 +36,7 @@ WRONG_FOR_SECOND_CAUSE: dict[tuple[str, str], str] = {
     ("DX511", "drake"): "DX304: followers of a follower are followers",
     ("DX512", "mujoco"): "DX304: a follower that leaves its limits follows",
     ("DX512", "drake"): "DX304: a follower that leaves its limits follows",
+    ("DX618", "pybullet"): "DX619: the base that is fixed floats",
     ("DX708", "drake"): "DX711: the file that is included is named by a model",
     ("DX711", "pybullet"): "DX708: a file is included",
 }

@@ -265,6 +265,10 @@ class LoadedPyBullet(LoadedRobot):
             raise UnusableEngineError(
                 f"pybullet fixes {model.name} to the world: there its root {shown(model.root)} has no mass"
             )
+        if self._form == "mjcf" and not model.floating and client.dynamics(ROOT)[0] != 0.0:
+            raise UnusableEngineError(
+                f"pybullet lets {model.name} float: its root {shown(model.root)} is fixed in the file alone"
+            )
         self._order = self._find_joints()
         self._set(client, calls)
         # Last: inertias that are set after the first inverse dynamics would be ignored.

@@ -686,6 +686,77 @@ class MeshOfMjcfNotFound(Rule):
                 yield found_in(document, mesh, reason)
 
 
+class PlaceOfFixedBody(Rule):
+    """DX618 place-of-fixed-body: A body is fixed to the world, and Pinocchio leaves out its place and mass.
+
+    A body of ``<worldbody>`` without a joint is fixed to the world at its ``pos``. Most arms have such a
+    base.
+
+    - MuJoCo 4.0 and Drake 1.51 read its place and its mass.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) puts the first body of the world at the origin, and with it the
+      robot. The frame of the body has no mass.
+    - PyBullet 3.2.7 lets the robot float (DX619).
+
+    The robot stands elsewhere: all poses are off by the place of the body. Jacobians and the equations of
+    motion differ only where the body is turned.
+
+    What to do: place the model in the world by your own transformation, or convert the file to URDF (``dynx
+    convert --to urdf``). ``dynx doctor --fix`` does not change it.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    advice = "Convert the file to URDF for Pinocchio (dynx convert --to urdf)."
+    engines = measured_on("pinocchio")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the first body of the world, where it is fixed away from the origin."""
+        document = mjcf_text(case)
+        for body in _fixed_bodies(document):
+            if (document.pose(body, "the body") != np.eye(4)).any():
+                yield _found_body(document, body, "is fixed to the world away from the origin")
+
+
+class FixedBodyFloats(Rule):
+    """DX619 fixed-body-floats: A body is fixed to the world, and PyBullet lets it float.
+
+    A body of ``<worldbody>`` without a joint is fixed to the world. Most arms have such a base.
+
+    - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 fix it to the world.
+    - PyBullet 3.2.7 (``loadMJCF``) makes it the base of a robot, which floats if the base has a mass.
+      ``loadMJCF`` has no option ``useFixedBase``.
+
+    The robot falls, and its mass matrix has six more rows.
+
+    What to do: tie the base to the world by ``p.createConstraint``, or convert the file to URDF and load it
+    with ``useFixedBase=True`` (``dynx convert --to urdf``). ``dynx doctor --fix`` does not change it.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    stated_refusal = True
+    advice = "Convert the file to URDF for PyBullet (dynx convert --to urdf)."
+    engines = measured_on("pybullet")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the first body of the world, where it is fixed."""
+        document = mjcf_text(case)
+        for body in _fixed_bodies(document):
+            yield _found_body(document, body, "is fixed to the world")
+
+
+def _fixed_bodies(document: MjcfText) -> Iterator[Element]:
+    """Yield the first body of the world if it has no joint."""
+    first = next(parts_of_bodies(document, "body"), None)
+    if first is not None and not any(each.tag in ("joint", "freejoint") for each in first.given.children):
+        yield first.given
+
+
+def _found_body(document: MjcfText, body: Element, message: str) -> Detection:
+    name = body.attributes.get("name")
+    return found_in(document, body, f"the body {message}", link=name)
+
+
 def _mesh_assets(document: MjcfText) -> Iterator[tuple[Element, str, str]]:
     """Yield each mesh that names a file, with that name and the reason why it is not found, mostly empty."""
     for mesh in document.sections("asset"):
