@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
@@ -210,3 +211,17 @@ def test_a_joint_that_is_fixed_in_mjcf_is_named_by_its_link(seed: int, floating:
     wanted = ("type", joint.name, f"{joint.child}_fixed")
     assert names(report) == [(wanted[0], wanted[2], wanted[1]) if swap else wanted]
     assert report.attributes == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_misplaced_joint_of_a_base_of_two_links_is_named_where_frames_are_moved(seed: int) -> None:
+    arm = dynx.load("six_axis_arm", base="floating")
+    box = Link("box", Inertial(2.0, Pose((0.1, 0.02, 0.03)), 0.02, 0.001, 0.0, 0.03, 0.002, 0.04))
+    held = Joint("to_box", "fixed", arm.root, "box", Pose((0.2, -0.1, 0.05), (0.3, 0.2, 0.1)))
+    robot = rebuilt(arm, [*arm.links, box], [*arm.joints, held])
+    joint = next(joint for joint in robot.joints if joint.moves)
+    x, y, z = joint.origin.xyz
+    placed = replace(joint, origin=Pose((x, y + 2e-4, z), joint.origin.rpy))
+    other = rebuilt(robot, robot.links, [placed if each is joint else each for each in robot.joints])
+    report = same_robot(robot, with_moved_frames(other, np.random.default_rng(seed)))
+    assert [(each.theirs, each.part) for each in report.differences] == [(joint.name, "origin")]
