@@ -80,6 +80,8 @@ class DifferingElement:
     changes: tuple[FieldChange, ...] = field(repr=False, default=())
     unchanged: bool = False
     """True if it is written as in `ours`: what stands before it differs."""
+    moved_link: tuple[str, Floats] | None = field(repr=False, default=None)
+    """Link whose frame the changes move, and the pose (4, 4) of its old frame in the new one."""
 
 
 @dataclass(frozen=True)
@@ -184,11 +186,12 @@ def _analysed(
     with fifty_digits():
         other = Skeleton(changed)
         found = fit(ours, other, Matching(ours, other, tolerance, base).find())
-        elements = [*known, *_of_joints(found, tolerance)]
+        joints = [*known, *_of_joints(found, tolerance)]
         inertials, unseen = _Inertias(found, tolerance).find()
+        elements = list(_in_moved_frames([*joints, *inertials], changed))
     names = [*(link.name for link in changed.links), *(joint.name for joint in changed.joints)]
     order = {name: k for k, name in enumerate(names)}
-    elements = sorted([*elements, *inertials], key=lambda each: (_line(changed, each), order[each.theirs]))
+    elements = sorted(elements, key=lambda each: (_line(changed, each), order[each.theirs]))
     return Analysis(found, tuple(elements), unseen)
 
 
@@ -428,7 +431,48 @@ def _moved_axis(found: Fit, each: BodyFit) -> DifferingElement:
         pose_text(joint.origin),
         tuple(changes),
         unchanged=are_alike(mine.origin, joint.origin),
+        moved_link=(link.name, back),
     )
+
+
+def _in_moved_frames(elements: list[DifferingElement], theirs: Model) -> Iterator[DifferingElement]:
+    """Yield the elements, with the values of those that are attached to a link whose frame another element
+    moves in its new frame. They alone state these values then."""
+    moved = dict(each.moved_link for each in elements if each.moved_link is not None)
+    if not moved:
+        yield from elements
+        return
+
+    def link_of(change: FieldChange) -> str | None:
+        if change.tag == "link":
+            return change.name if change.field == "inertial" else None
+        return theirs.joint(change.name).parent if change.field == "origin" else None
+
+    stated = {
+        (change.tag, change.name)
+        for each in elements
+        for change in each.changes
+        if link_of(change) in moved and (each.moved_link is None or each.moved_link[0] != link_of(change))
+    }
+    for each in elements:
+        own = None if each.moved_link is None else each.moved_link[0]
+        changes = []
+        for change in each.changes:
+            link = link_of(change)
+            if link is None or link not in moved:
+                changes.append(change)
+            elif link != own:
+                changes.append(replace(change, value=_in_frame(moved[link], change.value)))
+            elif (change.tag, change.name) not in stated:
+                changes.append(change)
+        yield replace(each, changes=tuple(changes))
+
+
+def _in_frame(back: Floats, value: Pose | Inertial | None) -> Pose | Inertial | None:
+    """Return a pose or an inertial in a frame in which its own frame has the pose `back` (4, 4)."""
+    if isinstance(value, Pose):
+        return Pose.from_matrix(back @ value.matrix)
+    return None if value is None else replace(value, origin=Pose.from_matrix(back @ value.origin.matrix))
 
 
 def _axis(found: Fit, each: BodyFit) -> DifferingElement:
