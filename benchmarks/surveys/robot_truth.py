@@ -46,7 +46,7 @@ class Quantities:
     g: Matrix
 
 
-def _cleaned(text: str) -> ET.Element:
+def cleaned(text: str) -> ET.Element:
     """Return URDF or SDF without shapes and mimics, continuous joints as revolute ones."""
     root = ET.fromstring(text.encode())
     for parent in list(root.iter()):
@@ -76,7 +76,7 @@ def _by_pinocchio(
 ) -> list[Quantities]:
     import pinocchio
 
-    given = ET.tostring(_cleaned(text), encoding="unicode")
+    given = ET.tostring(cleaned(text), encoding="unicode")
     free = (pinocchio.JointModelFreeFlyer(),) if floating else ()
     model: Any = cast(Any, pinocchio).buildModelFromXML(given, *free)
     data = model.createData()
@@ -132,7 +132,7 @@ def _by_drake(
     import pydrake.multibody.plant as plants
 
     plant: Any = plants.MultibodyPlant(0.0)
-    given = ET.tostring(_cleaned(text), encoding="unicode")
+    given = ET.tostring(cleaned(text), encoding="unicode")
     parser: Any = parsing.Parser(plant)
     parser.AddModelsFromString(given, "sdf")
     plant.Finalize()
