@@ -22,9 +22,9 @@ from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.identities import IDENTITIES
 from dynx.doctor import DoctorReport, Finding, diagnose
 from dynx.doctor.formats import Baseline, wording
-from dynx.doctor.formats.baseline import PlacedDifference
 from dynx.doctor.report import Effect
 from dynx.errors import DynxError
+from dynx.files.baseline import PlacedDifference
 from dynx.model.loading import load
 from dynx.model.tree import Base
 from dynx.testing.robot_plan import PlannedRobot, RobotPlan

@@ -89,16 +89,3 @@ def baseline_document(reports: Iterable[DoctorReport], folder: str) -> dict[str,
 def read_baseline(text: str, path: str) -> Baseline:
     """Read a baseline from the text of a file; ArgumentError names `path` where it is none."""
     return Baseline.read(text, path)
-
-
-__all__ = [
-    "UNEXPLAINED",
-    "Baseline",
-    "Place",
-    "PlacedDifference",
-    "accepted_by",
-    "baseline_document",
-    "differences",
-    "read_baseline",
-    "robot_key",
-]

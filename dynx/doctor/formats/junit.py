@@ -11,10 +11,11 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from xml.etree import ElementTree
 
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.baseline import Baseline, PlacedDifference, accepted_by
+from dynx.doctor.formats.baseline import Baseline, accepted_by
 from dynx.doctor.formats.causes import RuleFindings, causes
 from dynx.doctor.report import DoctorReport, Finding
 from dynx.errors import located
+from dynx.files.baseline import PlacedDifference
 from dynx.files.junit import KNOWN, Element, junit_failure, junit_result, junit_suite, junit_text
 
 _SHOWN_PLACES = 50

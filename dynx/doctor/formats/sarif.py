@@ -12,10 +12,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.baseline import UNEXPLAINED, Baseline, Place, accepted_by
+from dynx.doctor.formats.baseline import UNEXPLAINED, Baseline, accepted_by
 from dynx.doctor.formats.causes import advice, catalogue_entry, causes, severity
 from dynx.doctor.report import DoctorReport, Finding, Unexplained
 from dynx.errors import located
+from dynx.files.baseline import Place
 from dynx.files.sarif import (
     IGNORED,
     KNOWN,
