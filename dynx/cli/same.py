@@ -26,7 +26,7 @@ from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import json_text
 from dynx.files.writing import write_bytes
-from dynx.model.document_format import SUFFIXES, Format
+from dynx.model.document_format import SUFFIXES, format_of_root
 from dynx.model.loading import read_description, split_arguments
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
@@ -41,9 +41,6 @@ MAX_CELL = 40
 
 MAX_MESSAGE = 60
 """Largest number of characters of a message in a table."""
-
-FORMATS: dict[str, Format] = {"robot": "urdf", "mujoco": "mjcf"}
-"""Formats that are mended, by the root element of their files."""
 
 
 def same(
@@ -161,10 +158,7 @@ def _files_read(first: str, second: str) -> list[str]:
 def _check_suffix(path: str, second: str) -> None:
     """Raise ArgumentError for a file that has the suffix of another format than the second robot."""
     data, source, _ = read_description(second)
-    format_ = FORMATS.get(XmlSource(data, source).root.tag)
-    # Other formats are compared and not mended; the report says so.
-    if format_ is None:
-        return
+    format_ = format_of_root(XmlSource(data, source).root.tag)
     wanted = SUFFIXES[format_]
     if PurePath(path).suffix.lower() not in wanted:
         raise ArgumentError(

@@ -1,7 +1,7 @@
 """Mended text: the description with some elements replaced, and all else as it is written.
 
 What is written follows from two models, the one that was read and the one that it is to be. URDF can be
-mended wherever they differ; in MJCF inertias, places of bodies and axes of joints.
+mended wherever they differ; in MJCF and SDF inertias, places of bodies and axes of joints.
 """
 
 from __future__ import annotations
@@ -33,10 +33,17 @@ def mended_text(source: XmlSource, before: Model, after: Model) -> XmlSource:
 
     Raises NotMendedError for a change that cannot be written.
     """
-    if source.root.tag not in ("robot", "mujoco"):
-        raise NotMendedError(f"a file whose root is <{source.root.tag}> is not mended; URDF and MJCF are")
-    edits = _Urdf(source) if source.root.tag == "robot" else _Mjcf(source, before)
+    if source.root.tag not in ("robot", "mujoco", "sdf"):
+        raise NotMendedError(
+            f"a file whose root is <{source.root.tag}> is not mended; wanted URDF, MJCF or SDF"
+        )
+    edits: _Urdf | _Mjcf | _Sdf
     found: list[Edit] = []
+    if source.root.tag == "sdf":
+        edits = _Sdf(source)
+        found += edits.places(before, after)
+    else:
+        edits = _Urdf(source) if source.root.tag == "robot" else _Mjcf(source, before)
     for old, new in zip(before.joints, after.joints, strict=True):
         if old != new:
             found += edits.joint(old, new)
@@ -231,3 +238,87 @@ class _Mjcf:
             yield self._source.replacement(present, text)
         else:
             yield self._source.insertion(body, text, first=True)
+
+
+class _Sdf:
+    """Edits of SDF: poses of links are in their model, so that a joint is moved with all links below it."""
+
+    def __init__(self, source: XmlSource) -> None:
+        self._source = source
+        self._elements: dict[tuple[str, str], list[SourceElement]] = {}
+        for element in source.root.walk():
+            if element.tag in ("link", "joint"):
+                key = element.tag, element.attributes.get("name", "")
+                self._elements.setdefault(key, []).append(element)
+
+    def _element(self, tag: str, name: str) -> SourceElement:
+        found = self._elements.get((tag, name), [])
+        if len(found) != 1:
+            where = "stands more than once in" if found else "does not stand in"
+            raise NotMendedError(f"<{tag}> {name} {where} the file itself")
+        return found[0]
+
+    def joint(self, old: Joint, new: Joint) -> Iterator[Edit]:
+        if (old.type, old.mimic) != (new.type, new.mimic):
+            raise NotMendedError(f"the type or coupling of joint {old.name}: SDF is not mended for it")
+        if old.axis == new.axis:
+            return
+        joint = self._element("joint", old.name)
+        axis = joint.first("axis")
+        stated = None if axis is None else axis.first("xyz")
+        if axis is None or stated is None or stated.attributes or joint.first("pose") is not None:
+            raise NotMendedError(f"the axis of joint {old.name} is not written in the frame of its child")
+        if axis.first("use_parent_model_frame") is not None:
+            raise NotMendedError(f"the axis of joint {old.name} is written in the frame of the model")
+        yield self._source.replacement(stated, f"<xyz>{numbers(new.axis)}</xyz>")
+
+    def places(self, before: Model, after: Model) -> Iterator[Edit]:
+        """Yield the edits of the poses of links whose places in the root link differ at position 0."""
+        old, new = _places(before), _places(after)
+        for link in before.links:
+            # A link that a joint with two axes adds stands in no file.
+            if ("link", link.name) in self._elements and (old[link.name] != new[link.name]).any():
+                yield self._place(link.name, np.linalg.inv(old[link.name]) @ new[link.name])
+
+    def _place(self, link: str, moved: Floats) -> Edit:
+        """Move a link: `moved` (4, 4) is the pose of its new frame in its old one."""
+        element = self._element("link", link)
+        pose = element.first("pose")
+        text = "" if pose is None else self._source.text_in(pose)
+        given = [float(word) for word in text.split()] or [0.0] * 6
+        if (pose is not None and pose.attributes) or len(given) != 6:
+            raise NotMendedError(f"the pose of link {link} is written in another frame or unit")
+        T = Pose((given[0], given[1], given[2]), (given[3], given[4], given[5])).matrix @ moved
+        found = Pose.from_matrix(T)
+        written = f"<pose>{numbers([*found.xyz, *found.rpy])}</pose>"
+        if pose is None:
+            return self._source.insertion(element, written, first=True)
+        return self._source.replacement(pose, written)
+
+    def inertial(self, link: str, old: Inertial | None, new: Inertial | None) -> Iterator[Edit]:
+        element = self._element("link", link)
+        if new is None:
+            raise NotMendedError(f"link {link} without an inertia has 1 kg in SDF")
+        present = element.first("inertial")
+        if present is not None and present.attributes.get("auto") == "true":
+            raise NotMendedError(f"the inertia of link {link} follows from its shapes")
+        rows = "".join(f"<{name}>{number(getattr(new, name))}</{name}>" for name in MOMENTS)
+        lines = [
+            "<inertial>",
+            f"  <pose>{numbers([*new.origin.xyz, *new.origin.rpy])}</pose>",
+            f"  <mass>{number(new.mass)}</mass>",
+            f"  <inertia>{rows}</inertia>",
+            "</inertial>",
+        ]
+        if present is None:
+            yield self._source.insertion(element, "\n".join(lines), first=True)
+        else:
+            yield self._source.replacement(present, "\n".join(lines))
+
+
+def _places(model: Model) -> dict[str, Floats]:
+    """Return the pose (4, 4) of each link in the root link at position 0."""
+    found = {model.root: np.eye(4)}
+    for joint in model.joints:
+        found[joint.child] = found[joint.parent] @ joint.origin.matrix
+    return found

@@ -181,22 +181,59 @@ def test_a_model_is_mended_as_urdf() -> None:
     assert same_robot(model, report.mended_text).same
 
 
-def test_sdf_is_compared_and_not_mended() -> None:
-    text = """<sdf version="1.7"><model name="arm"><link name="base"/><link name="upper">
+SDF = """<sdf version="1.7"><model name="arm"><link name="base"/><link name="upper">
       <pose>0 0 0.3 0.3 0 0</pose>
       <inertial><pose>0.2 0.05 0.1 0 0 0</pose><mass>1.5</mass><inertia>
         <ixx>0.02</ixx><ixy>0.001</ixy><ixz>0.002</ixz><iyy>0.03</iyy><iyz>0.003</iyz><izz>0.04</izz>
       </inertia></inertial></link>
+      <!-- the forearm -->
+      <link name="lower"><pose>0.4 0.1 0.5 0.1 0.2 0.3</pose>
+      <inertial><pose>0.1 0.02 0.03 0 0 0</pose><mass>0.5</mass><inertia>
+        <ixx>0.002</ixx><ixy>0.0001</ixy><ixz>0.0002</ixz><iyy>0.003</iyy><iyz>0.0003</iyz><izz>0.004</izz>
+      </inertia></inertial></link>
       <joint name="fixed_base" type="fixed"><parent>world</parent><child>base</child></joint>
       <joint name="shoulder" type="revolute"><parent>base</parent><child>upper</child>
-      <axis><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis></joint></model></sdf>"""
-    other = text.replace("<xyz>0 1 0</xyz>", "<xyz>0 1 0.1</xyz>")
-    assert same_robot(text, text).same
-    report = same_robot(text, other)
-    assert [(each.part, each.theirs) for each in report.differences] == [("axis", "shoulder")]
+      <axis><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis></joint>
+      <joint name="elbow" type="revolute"><parent>upper</parent><child>lower</child>
+      <axis><xyz>1 0 0</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis></joint>
+      </model></sdf>"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "element"),
+    [
+        ("<xyz>0 1 0</xyz>", "<xyz>0 1 0.1</xyz>", ("shoulder", "axis")),
+        ("<mass>1.5</mass>", "<mass>1.7</mass>", ("upper", "inertial")),
+        ("0.4 0.1 0.5 0.1 0.2 0.3", "0.42 0.1 0.5 0.1 0.2 0.3", ("elbow", "origin")),
+        ("0.4 0.1 0.5 0.1 0.2 0.3", "0.4 0.1 0.5 0.1 0.2 0.4", ("elbow", "origin")),
+    ],
+)
+def test_sdf_is_mended(old: str, new: str, element: tuple[str, str]) -> None:
+    assert same_robot(SDF, SDF).same
+    other = SDF.replace(old, new)
+    report = same_robot(SDF, other)
+    assert [(each.theirs, each.part) for each in report.differences] == [element]
+    assert report.not_mended is None
+    assert report.mended_text is not None
+    text = report.mended_text.decode()
+    assert "<!-- the forearm -->" in text
+    assert same_robot(SDF, text).same
+
+
+def test_a_joint_of_sdf_is_moved_with_the_links_below_it() -> None:
+    # Both links are 0.1 m farther, so that only the first joint is elsewhere.
+    other = SDF.replace("<pose>0 0 0.3 0.3", "<pose>0.1 0 0.3 0.3").replace("<pose>0.4 0.1", "<pose>0.5 0.1")
+    report = same_robot(SDF, other)
+    assert report.mended_text is not None
+    assert same_robot(SDF, report.mended_text.decode()).same
+
+
+def test_what_sdf_writes_in_another_frame_is_not_mended() -> None:
+    other = SDF.replace("<xyz>0 1 0</xyz>", '<xyz expressed_in="upper">0 1 0.1</xyz>')
+    report = same_robot(SDF, other)
     assert report.mended is not None
     assert report.mended_text is None
-    assert report.not_mended is not None
+    assert "shoulder" in str(report.not_mended)
 
 
 def test_values_of_merged_bodies_are_called_so() -> None:

@@ -199,8 +199,8 @@ def doctor() -> None:
     "--fix",
     "fix",
     metavar="OUT",
-    help="File for B with the elements that differ replaced by those of A, in the format of B: .urdf, or "
-    ".xml or .mjcf for MJCF. A file of that name is replaced, unless it is A, B or included by them.",
+    help="File for B with the elements that differ replaced by those of A, in the format of B: .urdf, .sdf, "
+    "or .xml or .mjcf for MJCF. A file of that name is replaced, unless it is A, B or included by them.",
 )
 @json_option
 @report_options
