@@ -7,7 +7,8 @@ runs all blocks, those of the pages whose paths in docs begin with PAGE (ik.md, 
 
 - It finds the packages that ``pip install .`` brings, and those of the extras that the page names
   (``.[viewer,film]``, "the extras `mujoco` and `drake`"), and no others.
-- Its folder is empty but for `models`, that of the repository.
+- Its folder is empty but for `models`, that of the repository, and for commands the Python blocks above them
+  that the page calls "a complete file `NAME`".
 - It prints the block of text that follows a Python block at once, or what stands under a command of a console
   block; a line ``...`` stands for any lines. Numbers are compared in the digits shown, to a unit of the last;
   those below 1e-9 are rounding errors, and those in us or ms are times, which differ between machines.
@@ -71,6 +72,7 @@ _EXAMPLE = re.compile(r"^   \.\. code-block:: python\n\n((?:      .*\n|\n(?=    
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _EXTRAS = re.compile(r"\bextras?\s((?:`[\w-]+`(?:,?\sand\s|,\s|))+)|(?:\.|dynx|robotics)\[([\w,-]+)\]")
 _MACHINE_TIME = re.compile(r" (?:us|ms)\b")
+_FILE = re.compile(r"\ba\s+complete\s+file `([\w.]+)`")
 _INSTALLS = re.compile(r"\bpip install\b|^git clone\b", flags=re.MULTILINE)
 _TIME = re.compile(r"\d\s*(?:s|min)\b|\bminutes?\b|\bseconds\b|\bhours?\b")
 _CELL = "--- end of a block ---"
@@ -133,6 +135,8 @@ class Block(NamedTuple):
     """(code, output shown) of each part: one of a Python block, one for each command of a console block."""
     before: str
     """The two lines of the page above it."""
+    files: tuple[tuple[str, str], ...] = ()
+    """(name, text) of each file that the page shows before it, for commands."""
 
     @property
     def text(self) -> str:
@@ -177,8 +181,12 @@ def blocks_of(page: str) -> Iterator[Block]:
         yield Block(page, 1, "python", tuple(programs(text)), "")
     for line, code in examples(text):
         yield Block(page, line, "python", ((code, ""),), "")
+    files: tuple[tuple[str, str], ...] = ()
     for found in _BLOCK.finditer(text):
         language, code = found[1], found[2]
+        named = _FILE.search(text[: found.start()].rstrip("\n").rpartition("\n\n")[2])
+        if language == "python" and named:
+            files += ((named[1], code),)
         cells = {
             "python": ((code, found[3] or ""),),
             "console": tuple(commands(code)),
@@ -191,7 +199,8 @@ def blocks_of(page: str) -> Iterator[Block]:
         ):
             above = text[: found.start()].rstrip("\n")
             line = text[: found.start()].count("\n") + 1
-            yield Block(page, line, language, cells, "\n".join(above.splitlines()[-2:]))
+            before = "\n".join(above.splitlines()[-2:])
+            yield Block(page, line, language, cells, before, () if language == "python" else files)
 
 
 def examples(text: str) -> list[tuple[int, str]]:
@@ -204,11 +213,13 @@ def examples(text: str) -> list[tuple[int, str]]:
 
 def run(block: Block, *, small: bool = False) -> Outcome:
     """Run a block in a process and a folder of its own."""
-    with tempfile.TemporaryDirectory(prefix="dynx-block-") as name:
-        folder, aside = Path(name) / "here", Path(name) / "aside"
+    with tempfile.TemporaryDirectory(prefix="dynx-block-") as place:
+        folder, aside = Path(place) / "here", Path(place) / "aside"
         folder.mkdir()
         aside.mkdir()
         (folder / "models").symlink_to(ROOT / "models")
+        for name, text in block.files:
+            (folder / name).write_text(text, encoding="utf-8")
         (aside / "sitecustomize.py").write_text(_SEE_EXTRAS, encoding="utf-8")
         (aside / "dynx").write_text(_DYNX.format(python=sys.executable), encoding="utf-8")
         (aside / "pytest").write_text(f'#!/bin/sh\nexec {sys.executable} -m pytest "$@"\n', encoding="utf-8")

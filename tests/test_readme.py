@@ -101,6 +101,8 @@ def test_a_block_that_needs_another_is_found() -> None:
     assert run(wrong).fault.startswith("not printed: 2.3e-3")
     hidden = Block("ik.md", 1, "python", (("import viser\n", ""),), "")
     assert "No module named 'viser'" in run(hidden).fault
+    shown = Block("ik.md", 1, "sh", (("cat shown.txt\n", "text\n"),), "", (("shown.txt", "text\n"),))
+    assert run(shown).fault == ""
 
 
 def test_numbers_are_compared_in_the_digits_shown() -> None:
