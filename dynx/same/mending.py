@@ -259,36 +259,60 @@ class _Sdf:
         return found[0]
 
     def joint(self, old: Joint, new: Joint) -> Iterator[Edit]:
+        # Its place and axis are written with all places.
         if (old.type, old.mimic) != (new.type, new.mimic):
             raise NotMendedError(f"the type or coupling of joint {old.name}: SDF is not mended for it")
-        if old.axis == new.axis:
-            return
-        joint = self._element("joint", old.name)
-        axis = joint.first("axis")
-        stated = None if axis is None else axis.first("xyz")
-        if axis is None or stated is None or stated.attributes or joint.first("pose") is not None:
-            raise NotMendedError(f"the axis of joint {old.name} is not written in the frame of its child")
-        if axis.first("use_parent_model_frame") is not None:
-            raise NotMendedError(f"the axis of joint {old.name} is written in the frame of the model")
-        yield self._source.replacement(stated, f"<xyz>{numbers(new.axis)}</xyz>")
+        return iter(())
 
     def places(self, before: Model, after: Model) -> Iterator[Edit]:
-        """Yield the edits of the poses of links whose places in the root link differ at position 0."""
+        """Yield the edits of axes of joints, and of poses of links whose places in the root link differ at
+        position 0."""
         old, new = _places(before), _places(after)
         for link in before.links:
             # A link that a joint with two axes adds stands in no file.
             if ("link", link.name) in self._elements and (old[link.name] != new[link.name]).any():
                 yield self._place(link.name, np.linalg.inv(old[link.name]) @ new[link.name])
+        for joint, other in zip(before.joints, after.joints, strict=True):
+            if joint.moves and other.moves:
+                moved = np.linalg.inv(old[joint.child]) @ new[joint.child]
+                turned = bool((old[joint.child] != new[joint.child])[:3, :3].any())
+                yield from self._axis(joint, other, moved, turned=turned)
 
-    def _place(self, link: str, moved: Floats) -> Edit:
-        """Move a link: `moved` (4, 4) is the pose of its new frame in its old one."""
-        element = self._element("link", link)
+    def _axis(self, old: Joint, new: Joint, moved: Floats, *, turned: bool) -> Iterator[Edit]:
+        """Write the axis of a joint that differs, or that is written in the frame of the model if the link is
+        `turned`; `moved` (4, 4) is the pose of the link's new frame in its old one."""
+        if old.axis == new.axis and (not turned or ("joint", old.name) not in self._elements):
+            return
+        joint = self._element("joint", old.name)
+        axis = joint.first("axis")
+        stated = None if axis is None else axis.first("xyz")
+        if axis is None or stated is None:
+            raise NotMendedError(f"the axis of joint {old.name} is not written in the file")
+        given = axis.first("use_parent_model_frame")
+        in_model = given is not None and self._source.text_in(given) in ("1", "true")
+        in_model = in_model or stated.attributes.get("expressed_in") == "__model__"
+        if in_model:
+            R = (self._pose(self._element("link", old.child), old.child) @ moved)[:3, :3]
+            written = "".join(f' {name}="{value}"' for name, value in stated.attributes.items())
+            yield self._source.replacement(stated, f"<xyz{written}>{numbers(R @ np.array(new.axis))}</xyz>")
+        elif old.axis != new.axis:
+            if stated.attributes or joint.first("pose") is not None:
+                raise NotMendedError(f"the axis of joint {old.name} is not written in the frame of its child")
+            yield self._source.replacement(stated, f"<xyz>{numbers(new.axis)}</xyz>")
+
+    def _pose(self, element: SourceElement, link: str) -> Floats:
+        """Return the pose (4, 4) of a link in its model, as the file states it."""
         pose = element.first("pose")
         text = "" if pose is None else self._source.text_in(pose)
         given = [float(word) for word in text.split()] or [0.0] * 6
         if (pose is not None and pose.attributes) or len(given) != 6:
             raise NotMendedError(f"the pose of link {link} is written in another frame or unit")
-        T = Pose((given[0], given[1], given[2]), (given[3], given[4], given[5])).matrix @ moved
+        return Pose((given[0], given[1], given[2]), (given[3], given[4], given[5])).matrix
+
+    def _place(self, link: str, moved: Floats) -> Edit:
+        """Move a link: `moved` (4, 4) is the pose of its new frame in its old one."""
+        element = self._element("link", link)
+        pose, T = element.first("pose"), self._pose(element, link) @ moved
         found = Pose.from_matrix(T)
         written = f"<pose>{numbers([*found.xyz, *found.rpy])}</pose>"
         if pose is None:

@@ -228,6 +228,17 @@ def test_a_joint_of_sdf_is_moved_with_the_links_below_it() -> None:
     assert same_robot(SDF, report.mended_text.decode()).same
 
 
+@pytest.mark.parametrize("pose", ["0.4 0.1 0.5 0.1 0.2 0.4", "0.42 0.1 0.5 0.1 0.2 0.3"])
+def test_axes_of_sdf_in_the_frame_of_the_model_are_turned_with_their_links(pose: str) -> None:
+    frame = "<use_parent_model_frame>true</use_parent_model_frame><limit>"
+    first = SDF.replace('version="1.7"', 'version="1.6"').replace("<limit>", frame)
+    # With the pose alone the axis would be another one in the link, too.
+    report = same_robot(first, first.replace("0.4 0.1 0.5 0.1 0.2 0.3", pose))
+    assert not report.same
+    assert report.mended_text is not None, report.not_mended
+    assert same_robot(first, report.mended_text.decode()).same
+
+
 def test_what_sdf_writes_in_another_frame_is_not_mended() -> None:
     other = SDF.replace("<xyz>0 1 0</xyz>", '<xyz expressed_in="upper">0 1 0.1</xyz>')
     report = same_robot(SDF, other)
