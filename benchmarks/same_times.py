@@ -58,7 +58,7 @@ def main(names: Sequence[str]) -> None:
     """Print the least times of some repetitions."""
     for name in names:
         for base in ("fixed", "floating"):
-            model = dynx.load(name, base=base)  # type: ignore[arg-type]
+            model = dynx.load(name, base=base)
             copy = with_moved_frames(model, np.random.default_rng(3))
             other = with_moved_frames(with_two_differences(model), np.random.default_rng(3))
             for what, second in (("itself", model), ("rewritten", copy), ("two differences", other)):

@@ -126,7 +126,7 @@ class Observability:
         if not set(bodies) <= set(self._reduced_bodies):
             self._reduced_bodies = list(dict.fromkeys([*self._reduced_bodies, *bodies]))
             wanted = self._regressor[:, _columns_of(self._reduced_bodies)]
-            self._reduced = np.linalg.qr(wanted, mode="r")
+            self._reduced = np.asarray(np.linalg.qr(wanted, mode="r"))
         return self._reduced[:, _columns_of([self._reduced_bodies.index(body) - 1 for body in bodies])]
 
     @cached_property
