@@ -510,7 +510,7 @@ def run_pairs(snapshots: Path, folder: Path, part: str | None, jobs: int, result
         for repository in (LIBRARY, *REPOSITORIES)
         for _, path, place in extract(snapshots, folder, repository)
     }
-    tasks = []
+    tasks: list[tuple[Pair, str, str]] = []
     for pair in read_pairs():
         if part not in (None, pair.part):
             continue
@@ -518,7 +518,7 @@ def run_pairs(snapshots: Path, folder: Path, part: str | None, jobs: int, result
         for place, digest in zip(files, (pair.digest, pair.other_digest), strict=True):
             if sha256_of(place.read_text(encoding="utf-8", errors="replace")) != digest:
                 raise ValueError(f"{place} is not the file of the list")
-        tasks.append((pair, *map(str, files)))
+        tasks.append((pair, str(files[0]), str(files[1])))
     with Workers(compare, jobs, timeout=120.0) as workers, results.open("w", encoding="utf-8") as file:
         for outcome in workers.run(tasks):
             failure = outcome.failure

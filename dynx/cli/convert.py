@@ -23,14 +23,13 @@ from dynx.cli.shell.output import (
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.files.links import refuse_links
 from dynx.model.conversion import (
-    SUFFIXES,
     Conversion,
     holds,
     without_collision_faults,
     without_shapes,
 )
 from dynx.model.conversion import convert as convert_model
-from dynx.model.document_format import Format
+from dynx.model.document_format import SUFFIXES, Format
 from dynx.model.geometry import Mesh
 from dynx.model.loading import split_arguments
 from dynx.model.model import Model

@@ -12,7 +12,7 @@ import numpy as np
 
 from dynx.errors import DescriptionError
 from dynx.model import Model
-from dynx.model.elements import Joint
+from dynx.model.elements import Joint, Link
 from dynx.model.geometry.links import Collision, ShapeNumber, Visual
 from dynx.model.geometry.mesh import Mesh
 from dynx.model.mechanism import ROOT
@@ -179,10 +179,10 @@ def _of_shapes(
     unmatched = [shape.words for shape in alone]
     if unmatched or left:
         names = [
-            model.links[numbers[0]]
-            for model, numbers in (
-                (ours, found.ours.links[each.ours]),
-                (theirs, found.theirs.links[each.theirs]),
+            _link_of_shapes(model, numbers, [*own, *others])
+            for model, numbers, own, others in (
+                (ours, found.ours.links[each.ours], alone, left),
+                (theirs, found.theirs.links[each.theirs], left, alone),
             )
         ]
         first, second = (
@@ -192,6 +192,14 @@ def _of_shapes(
             second = f"placed otherwise: {second}"
         lines = names[0].line, names[1].line
         yield Attribute(kind, "link", names[0].name, names[1].name, first, second, *lines)
+
+
+def _link_of_shapes(model: Model, numbers: list[int], shapes: list[_ShapeOfBody]) -> Link:
+    """Return the link of a body that has the first of some shapes, or the name of the link that has it in the
+    other description; the first link of the body if it has neither."""
+    links = {model.links[number].name: model.links[number] for number in numbers}
+    named = (shape.number[0] for shape in shapes if shape.number is not None)
+    return next((links[name] for name in named if name in links), model.links[numbers[0]])
 
 
 def _matched_shapes(

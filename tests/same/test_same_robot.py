@@ -494,3 +494,19 @@ def test_unusable_descriptions_raise_the_errors_of_load() -> None:
         same_robot("<robot name='r'><link name='a'/><link name='b'/></robot>", "ur5")
     with pytest.raises(dynx.errors.ArgumentError):
         same_robot("ur5", 3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_shapes_are_named_by_the_link_that_has_them(swapped: bool) -> None:
+    text = """<robot name="r"><link name="base"/>
+      <link name="plate"><visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual></link>
+      <joint name="f" type="fixed"><parent link="base"/><child link="plate"/></joint>
+      <link name="tip"><inertial><mass value="1"/>
+        <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+      <joint name="j" type="continuous"><parent link="plate"/><child link="tip"/><axis xyz="0 1 0"/></joint>
+      </robot>"""
+    for other in (text.replace("0.2 0.3", "0.2 0.4"), text.replace('<box size="0.1 0.2 0.3"/>', "<box/>")):
+        pair = (other, text) if swapped else (text, other)
+        (found,) = same_robot(*pair).attributes
+        assert (found.kind, found.ours, found.theirs) == ("visual shapes", "plate", "plate")
+        assert (found.first_line, found.second_line) == (2, 2)

@@ -70,7 +70,7 @@ def test_engines_judge_a_report(tmp_path: Path, part: str) -> None:
     paths[0].write_text(ARM.to_urdf(), encoding="utf-8")
     paths[1].write_text(text.replace(*changes[part], 1), encoding="utf-8")
     pair = Pair("develop", "o/r", "c", "a.urdf", "", "o/r", "c", "b.xml", "")
-    result = compare((pair, *map(str, paths)))
+    result = compare((pair, str(paths[0]), str(paths[1])))
     assert result.note == ""
     assert not missed(result)
     assert result.engines is not None
