@@ -49,6 +49,7 @@ WITHOUT_CAUSE = {
     </joint>
 """,
     "DX709": "link",
+    "DX712": "<ixy>0.03125</ixy>",
 }
 """What of the trap of each stated omission is its cause."""
 
@@ -239,6 +240,14 @@ def test_a_missing_mesh_of_sdf_is_named_and_hinders_no_comparison(tmp_path: Path
         assert mesh.refused_by == ("pybullet",)
         assert report.status == "explained", report.unexplained
         assert "model 'crane' was not found" in mesh.reason
+
+
+def test_a_joint_called_world_gets_another_name() -> None:
+    case = Case(XmlSource(SDF.replace('joint name="foot"', 'joint name="world"')), "fixed")
+    rule = find_rule("DX710")
+    remedy = rule.remedy(case, rule.detect(case))
+    assert remedy is not None
+    assert 'joint name="world_joint"' in remedy.case.source.text
 
 
 def test_shapes_of_one_link_with_one_name_get_names_of_their_own() -> None:

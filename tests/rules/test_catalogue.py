@@ -41,6 +41,7 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
     "DX618": {"DX619": "the base that is fixed floats in PyBullet"},
     "DX708": {"DX711": "what is included is named by a model"},
     "DX711": {"DX708": "a file is included"},
+    "DX712": {"DX701": "moments of their own are those of no box"},
 }
 
 # Rules whose remedy changes more than the links, joints and lines of the detections: rule -> the reason.

@@ -353,9 +353,11 @@ class SharedNameOfSdf(EditingRule):
     the file.
 
     Names of links, joints and frames must differ within a model, and those of collisions and of visuals
-    within a link. Older files have a joint with the name of its link, or two visuals called ``visual``.
+    within a link. Older files have a joint with the name of its link, a joint called ``world``, which is the
+    name of the world, or two visuals called ``visual``.
 
-    - Drake 1.51 refuses the whole file: "Non-unique name" or "visual with name[visual] already exists".
+    - Drake 1.51 refuses the whole file: "Non-unique name", "The supplied joint name [world] is reserved" or
+      "visual with name[visual] already exists".
     - PyBullet 3.2.7 (``loadSDF``) loads it.
 
     What to do: give the second part another name. ``dynx doctor --fix`` does so, in mimic joints too;
@@ -373,7 +375,7 @@ class SharedNameOfSdf(EditingRule):
         for model in case.source.root.walk():
             if model.tag != "model":
                 continue
-            links = {each.attributes.get("name") for each in model.all("link")}
+            links = {"world", *(each.attributes.get("name") for each in model.all("link"))}
             taken = links | {each.attributes.get("name") for each in model.all("joint")}
             for part in model.children:
                 name = part.attributes.get("name", "")
@@ -382,7 +384,8 @@ class SharedNameOfSdf(EditingRule):
                 elif part.tag == "joint" and name in links:
                     new = fresh_name(f"{name}_joint", [each for each in taken if each])
                     taken.add(new)
-                    detection = _found(part, part, "the joint has the name of a link")
+                    whose = "the world" if name == "world" else "a link"
+                    detection = _found(part, part, f"the joint has the name of {whose}")
                     yield Correction(detection, _joint_edits(case, model, part, new))
 
 
@@ -452,3 +455,33 @@ class ModelsInOtherFolders(CallingRule):
 
 _MODEL = re.compile("model://[^/]+")
 """URI of a model without a path in its folder."""
+
+
+class ProductsOfInertiaOfSdf(Rule):
+    """DX712 products-of-inertia-of-sdf: A tensor of SDF has products of inertia, which PyBullet cannot hold.
+
+    ``<ixy>``, ``<ixz>`` and ``<iyz>`` are the products of inertia in the frame of the inertial.
+
+    - Drake 1.51 reads them.
+    - PyBullet 3.2.7 (``loadSDF``) reads no moments at all (DX701), and ``changeDynamics`` sets three, about
+      the axes of the inertial. The products are lost.
+
+    The effect is as large as the products are beside the moments.
+
+    What to do: turn the frame of the inertial into the principal axes: ``<pose>`` of ``<inertial>``. ``dynx
+    convert --to urdf`` writes a file whose tensors PyBullet reads. ``dynx doctor --fix`` does not change it.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    stated = True
+    advice = "Turn the frame of the inertial into the principal axes, or convert the file to URDF."
+    engines = measured_on("pybullet")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield links whose tensor has a product that is not zero."""
+        for link in _parts(case, "link"):
+            for element in link.walk():
+                if element.tag in ("ixy", "ixz", "iyz") and float(case.source.text_in(element) or "0"):
+                    yield _found(link, element, f"<{element.tag}> is {case.source.text_in(element)}")
+                    break
