@@ -70,14 +70,16 @@ class _Loaded:
 
     def line_of(self, element: DifferingElement, name: str) -> int | None:
         """Return the line on which an element stands, of the joint or link of that name; in URDF that of the
-        part itself."""
+        part itself. The place of a joint stands at its child in MJCF and SDF."""
         if self.leaves_base_open:
             for each in self.source.root.all(element.tag):
                 if each.attributes.get("name") == name:
                     part = each.first(PARTS[element.part])
                     return each.line if part is None else part.line
         if element.tag == "joint":
-            return self.model.joint(name).line
+            joint = self.model.joint(name)
+            body = self.model.link(joint.child).line if element.part == "origin" and self.data else None
+            return joint.line if body is None else body
         link = self.model.link(name)
         return link.line if link.inertial is None else link.inertial.line or link.line
 

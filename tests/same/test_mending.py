@@ -271,3 +271,18 @@ def test_values_that_differ_are_written_with_digits_that_differ() -> None:
 def test_rounding_is_written_as_zero() -> None:
     assert vector_text((2.298e-18, 0.0, -1.0)) == "0 0 -1"
     assert vector_text((1e-18, -2e-18, 0.0)) == "1e-18 -2e-18 0"
+
+
+def test_the_place_of_a_joint_has_the_line_of_its_body() -> None:
+    text = dynx.load("six_axis_arm").to_mjcf()
+    lines = text.splitlines()
+    moved = next(number for number, line in enumerate(lines, 1) if '<body name="wrist"' in line)
+    pose = 'pos="0.42 0.0 0.0"'
+    assert pose in lines[moved - 1]
+    other = text.replace(lines[moved - 1], lines[moved - 1].replace(pose, 'pos="0.43 0.0 0.0"'))
+    (each,) = same_robot(text, other).differences
+    assert (each.part, each.first_line, each.second_line) == ("origin", moved, moved)
+    other = SDF.replace("0.4 0.1 0.5 0.1 0.2 0.3", "0.42 0.1 0.5 0.1 0.2 0.3")
+    (each,) = same_robot(SDF, other).differences
+    number = next(number for number, line in enumerate(SDF.splitlines(), 1) if '<link name="lower">' in line)
+    assert (each.part, each.second_line) == ("origin", number)
