@@ -204,7 +204,9 @@ def markdown(rows: Sequence[Row]) -> str:
         cells = []
         for name in names:
             pair = [row for row in rows if (row.robot, row.quantity) == (name, quantity)]
-            cells.append(", ".join(f"{1e9 * row.compiled:,.0f} ({row.ratio:.3g}x)" for row in pair))
+            cells.append(
+                ", ".join(f"{1e9 * row.compiled:,.0f} ({float(f'{row.ratio:.3g}'):,g}x)" for row in pair)
+            )
         lines.append(f"| `{quantity}` | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

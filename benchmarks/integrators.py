@@ -140,7 +140,7 @@ def late(integrator: str, steps: int, tolerance: float) -> float:
 def energies(duration: float) -> Iterator[Line]:
     """Drift of the energy of UR5 in steps of 1 ms: from rest at zero, and at random configurations."""
     yield (
-        f"\nUR5 falling for {duration:g} s at 1 ms: largest change of the energy over the largest kinetic",
+        f"\nUR5 falls for {duration:g} s, steps of 1 ms: largest change of energy / largest kinetic energy",
         True,
     )
     task = Task()

@@ -113,7 +113,7 @@ def backend_tables(outputs: Sequence[str]) -> str:
     ]
     heads = [f"`{name}`" for name in names]
     return (
-        f"Time over that of `compiled`, {largest:,} samples:\n\n"
+        f"Time divided by the time of `compiled`, {largest:,} samples:\n\n"
         + table(("", *heads[1:]), ratios)
         + "\nInverse dynamics, microseconds per sample:\n\n"
         + table(("samples in a call", *heads), sizes)

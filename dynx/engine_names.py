@@ -123,7 +123,9 @@ PINOCCHIO = {
     "ccrba": "Backend.centroidal_momentum(q, v)",
     "computeABADerivatives": "dynx.Derivatives",
     "computeAllTerms": "the methods of Backend, such as Backend.mass_matrix(q) and Backend.bias_torque(q, v)",
-    "computeForwardKinematicsDerivatives": "dynx.Derivatives for poses by q; Backend.jacobian(q, frame) for velocities by v",
+    "computeForwardKinematicsDerivatives": (
+        "dynx.Derivatives for poses by q; Backend.jacobian(q, frame) for velocities by v"
+    ),
     "computeJointJacobian": "Backend.jacobian(q, link, reference='local') of the child link",
     "computeJointJacobians": "Backend.jacobian(q, link, reference='world') of each child link",
     "computeMinverse": "Backend.forward_dynamics(q, v, tau), or numpy.linalg.inv(Backend.mass_matrix(q))",
