@@ -229,7 +229,7 @@ def _show_attributes(out: Console, attributes: Sequence[Entry]) -> None:
     """Print one line for each kind, with the first of its differences."""
     if not attributes:
         return
-    table = Table("apart from the verdict", "count", "first", "in A", "in B", right=("count",), keys=1)
+    table = Table("other differences", "count", "first", "in A", "in B", right=("count",), keys=1)
     counts = Counter(each["kind"] for each in attributes)
     for kind, count in counts.items():
         each = next(each for each in attributes if each["kind"] == kind)
@@ -246,7 +246,7 @@ def _show_attributes(out: Console, attributes: Sequence[Entry]) -> None:
 def _show_freedoms(out: Console, freedoms: Sequence[Entry]) -> None:
     if not freedoms:
         return
-    out.print("\nno difference of the robots")
+    out.print("\nallowed differences")
     for each in freedoms[:MAX_ROWS]:
         out.print(f"  {one_line(each['message'])}")
     print_rest(out, len(freedoms) - MAX_ROWS)
