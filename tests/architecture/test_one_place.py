@@ -29,6 +29,9 @@ IDEAS = {
     "a scene in MuJoCo": r"^class MjcfDocument\b",
     "a document in MJCF": r"\bElement\(\"mujoco\"",
     "types of arguments": r"^def checks_types\b",
+    "reports in SARIF": r"sarif-2\.1\.0",
+    "reports in JUnit XML": r"\"testsuites\"",
+    "accepted differences": r"^class BaselineDocument\b",
 }
 """Text that only the module of an idea contains, by the name of the idea."""
 
