@@ -14,9 +14,9 @@ RANKS = ("within", "falls", "cannot", "setting", "unexplained")
 VERDICT_MEANINGS = {
     "within": "the error is within the tolerance at every step",
     "falls": "the error falls with the step, at the order given",
-    "setting": "the error stays, and a setting of the engine is its cause: shown by running again",
-    "cannot": "the engine lacks a parameter on which the exact value rests",
-    "unexplained": "the error stays, and no setting that is known removes it",
+    "setting": "the error stays, and a setting of the engine is its cause, which a second run shows",
+    "cannot": "the exact value needs a parameter that the engine does not have",
+    "unexplained": "the error stays, and no setting that dynx tries is its cause",
 }
 
 SINGLE_STEP = (
