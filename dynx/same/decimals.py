@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from decimal import Decimal, localcontext
+from decimal import Context, Decimal, localcontext
 from functools import lru_cache
 
 import numpy as np
@@ -39,9 +39,8 @@ class StatedDecimal(Decimal):
 
 @contextmanager
 def fifty_digits() -> Iterator[None]:
-    """Evaluate the block in 50 digits."""
-    with localcontext() as context:
-        context.prec = DIGITS
+    """Evaluate the block in 50 digits, whatever the context of the caller; other threads keep theirs."""
+    with localcontext(Context(prec=DIGITS)):
         yield
 
 
@@ -53,8 +52,7 @@ def _sine_and_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
         with mpmath.mp.workdps(DIGITS + GUARD_DIGITS):
             x = mpmath.mpf(str(angle))
             return Decimal(str(mpmath.sin(x))), Decimal(str(mpmath.cos(x)))
-    with localcontext() as context:
-        context.prec = DIGITS + GUARD_DIGITS
+    with localcontext(Context(prec=DIGITS + GUARD_DIGITS)) as context:
         # Taylor series of both at once: term n is x^n / n!.
         term, n, sums = Decimal(1), 0, [Decimal(0), Decimal(0)]
         while abs(term) > Decimal(10) ** -context.prec:
@@ -66,7 +64,9 @@ def _sine_and_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
 
 def _decimal(number: float) -> StatedDecimal:
     whole = int(number)
-    return StatedDecimal(whole if whole == number else repr(float(number)))
+    # Beyond 2^53 the digits of a whole number are more than those of the shortest decimal.
+    short = whole == number and abs(whole) <= 2**53
+    return StatedDecimal(whole if short else repr(float(number)))
 
 
 def decimals(numbers: object) -> Array:
