@@ -32,7 +32,7 @@ of their paths, and most names of their joints.
 - **Engines without dynx check each report.** Pinocchio loads the URDF file and MuJoCo the MJCF file. A
   *missed* difference is one that the engines see and the report lacks, or one that remains after all named
   elements are replaced. An *unreal* element changes no mass and no joint-space inertia in Pinocchio, if
-  only this element is put back. An engine cannot check a pair if it refuses a file.
+  only this element is reinserted. An engine cannot check a pair if it refuses a file.
 - **Half of the pairs were used in development**, chosen by a hash. The other half was compared once, at the
   end.
 

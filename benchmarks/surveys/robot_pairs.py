@@ -142,7 +142,7 @@ class PairResult:
     mended: float | None = None
     """That of the first robot and the mended second one."""
     put_back: int = 0
-    """Number of elements that were put back alone."""
+    """Number of elements that were reinserted alone."""
     unreal: tuple[str, ...] = ()
     """Those of them without effect."""
     note: str = ""
@@ -553,9 +553,9 @@ def summary(results: Sequence[PairResult]) -> str:
     put_back = sum(each.put_back for each in results)
     return (
         f"{len(results)} pairs: {words['same']} the same robot, {words['different']} different, "
-        f"{words['refused']} refused. Engines judge {len(judged_ones)}. Pairs with a difference that engines "
-        f"see and dynx does not name: {sum(map(missed, results))}. Of {put_back} elements that were put "
-        f"back alone, {sum(len(each.unreal) for each in results)} have no effect in Pinocchio."
+        f"{words['refused']} refused. Engines check {len(judged_ones)}. Pairs with a difference that engines "
+        f"see and dynx does not name: {sum(map(missed, results))}. Of {put_back} elements that were "
+        f"reinserted alone, {sum(len(each.unreal) for each in results)} have no effect in Pinocchio."
     )
 
 
