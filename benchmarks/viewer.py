@@ -34,7 +34,7 @@ from tests.viewer.conftest import BROWSERS, SOFTWARE
 PATIENCE = 120.0
 """Longest wait for the page [s]."""
 
-SIZE = {"width": 1280, "height": 800}
+SIZE = {"width": 1400, "height": 850}
 """Size of the page [pixels]."""
 
 HUMANOIDS = ("talos", "g1", "icub")

@@ -27,6 +27,7 @@ from http import HTTPStatus
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 
 from dynx.files.temporary import temporary_folder, writing_in
+from dynx.viewer.first_picture import FIRST_PICTURE
 from dynx.viewer.library import CLIENT
 from dynx.viewer.moving_picture import ALWAYS_WHOLE, COARSE_WHILE_MOVING
 from dynx.viewer.pose_channel import PLACING
@@ -287,6 +288,13 @@ HOVERED = "dynx-hovered"
 _NO_SOFTWARE_MESSAGE = "<style>#webgl-software-rendering { display: none; }</style>"
 """Hides the message of viser that software draws: dynx says so itself (a note) and has prepared for it."""
 
+_OWN_LAYERS = """<style>
+  canvas[width="0"][height="0"] { visibility: hidden; }
+  [data-dock-region] { will-change: opacity; }
+</style>"""
+"""Keeps the panel, and viser's canvas for rectangles while it is empty, out of one transparent layer as large
+as the page, which software would blend with each picture for a tenth of its time."""
+
 _LEGEND_STYLE = (
     "position: fixed; left: 0.5em; top: 0.5em; max-width: 20em; padding: 0.1em; border-radius: 3px; "
     "font-family: sans-serif; color: black; background: rgba(255, 255, 255, 0.8)"
@@ -486,7 +494,7 @@ _BEFORE_PICTURES = (
         }
       });
   };
-  setInterval(() => {
+  const prepare = () => {
     const page = window.__viserMutable, scene = page?.scene;
     if (!scene) return;
     if (writing() !== written || seenThrough() !== faded) page.requestRender?.();
@@ -500,6 +508,7 @@ _BEFORE_PICTURES = (
       set: (given) => { resetting = given; },
     });
     scene.onBeforeRender = (renderer, drawn, camera) => {
+      noteShapes();
       shift(camera);
       watchCamera(camera);
       write(renderer.domElement, camera);
@@ -512,7 +521,8 @@ _BEFORE_PICTURES = (
       drawCoarsely(renderer, drawn, camera);
     };
     scene.onAfterRender = drawWhole;
-  }, 100);
+  };
+  setInterval(prepare, 100);
 """
 )
 
@@ -619,13 +629,14 @@ class Client:
         self.folder = self._kept.enter_context(temporary_folder("dynx-page-"))
         """The folder that is served."""
         script = ALWAYS_WHOLE if antialiasing else COARSE_WHILE_MOVING
-        script += PLACING + _PRESSES + _OWN_COLOURS + _NAMES_ON_HOVER + SHADOWS + _BEFORE_PICTURES + _INPUT
+        script += FIRST_PICTURE + PLACING + _PRESSES + _OWN_COLOURS + _NAMES_ON_HOVER + SHADOWS
+        script += _BEFORE_PICTURES + _INPUT
         policy = ContentPolicy("'self' data: blob:")
         self.headers = tuple(policy.headers([HANDLER_HASH]))
         """Headers with which the page is served."""
         self._text = _guarded(CLIENT.read_text(encoding="utf-8"), script, policy)
         if not antialiasing:
-            self._text = self._text.replace("</head>", f"{_NO_SOFTWARE_MESSAGE}</head>", 1)
+            self._text = self._text.replace("</head>", f"{_NO_SOFTWARE_MESSAGE}{_OWN_LAYERS}</head>", 1)
         self.entitle(title)
 
     def entitle(self, title: str) -> None:
@@ -661,7 +672,8 @@ def standalone(
     With `software` the page does not say that software draws it: its meshes were reduced for that.
     """
     policy = ContentPolicy("data: blob:")
-    script = ALWAYS_WHOLE + PLACING + _OWN_COLOURS + _NAMES_ON_HOVER + SHADOWS + _BEFORE_PICTURES
+    script = ALWAYS_WHOLE + FIRST_PICTURE + PLACING + _OWN_COLOURS + _NAMES_ON_HOVER + SHADOWS
+    script += _BEFORE_PICTURES
     page = _guarded(page, script, policy)
     meta = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy.text(), quote=True)}">'
     page = page.replace("<head>", f"<head>{meta}", 1)

@@ -21,6 +21,16 @@ CELL = 5.0
 """Largest size of the cells in which the vertices of a shape become one, while something moves, in pixels of
 the picture."""
 
+TRIANGLES = 12_000
+"""Number of triangles of coarse shapes in a picture, while something moves, above which the cells of the
+heavy ones grow. A triangle takes software about a microsecond, however small it is."""
+
+_COARSEST = 3
+"""Largest number of times by which cells grow, by the root of two."""
+
+_HEAVY = 300
+"""Number of triangles of a coarse shape above which its cells may grow."""
+
 _LIGHT = 200
 """Number of triangles up to which a shape is always drawn whole."""
 
@@ -39,13 +49,14 @@ ALWAYS_WHOLE = """
 COARSE_WHILE_MOVING = (
     f"const MOVING = {json.dumps(MOVING)}, CHECK_AFTER = {round(1e3 * STILL_AFTER / _CHECKS)};"
     f"const CHECKS = {_CHECKS}, CELL = {CELL}, LIGHT = {_LIGHT}, LEVELS = {_LEVELS}, SAVED = {_SAVED};"
+    f"const TRIANGLES = {TRIANGLES}, COARSEST = {_COARSEST}, HEAVY = {_HEAVY};"
     + """
   const context = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, options) {
     const cheap = {...options, antialias: false, preserveDrawingBuffer: false};
     return context.call(this, kind, kind.startsWith("webgl") ? cheap : options);
   };
-  let waiting = false, quiet = 0, view = null;
+  let waiting = false, quiet = 0, view = null, seen = false, begun = false;
   const stateOfPicture = () => window.__viserMutable?.scene?.__r3f?.root?.getState?.();
   // Programs are told the size of the whole picture, also while it has fewer pixels.
   const tellWholeSize = (page) => {
@@ -85,6 +96,8 @@ COARSE_WHILE_MOVING = (
   const noteMessage = (message) => { if (isWanted(message)) setResolution(1); };
   const noteMotion = () => {
     const page = window.__viserMutable;
+    // What is placed for the first time has not moved, nor has the camera.
+    if (!begun) return;
     quiet = 0;
     if (page?.getRenderRequestState === "ready" && !page.messageQueue.some(isWanted)) setResolution(MOVING);
     if (waiting) return;
@@ -95,7 +108,7 @@ COARSE_WHILE_MOVING = (
     if (window.__viserMutable.cameraControl?.camera !== camera) return;
     const now = camera.matrixWorld.elements.map((each) => Math.fround(each)).join();
     // A picture that is being drawn keeps its size.
-    if (view !== null && now !== view) setTimeout(noteMotion);
+    if (begun && view !== null && now !== view) setTimeout(noteMotion);
     view = now;
   };
   // All vertices of a shape in one cell are at one place; those that face different ways stay apart.
@@ -197,6 +210,13 @@ COARSE_WHILE_MOVING = (
     const state = stateOfPicture();
     return state?.viewport.dpr === MOVING && state.camera === camera;
   };
+  let coarseness = 0;
+  const adjustCoarseness = (triangles) => {
+    // A cell that is larger by the root of two has half the triangles.
+    if (triangles > TRIANGLES)
+      coarseness = Math.min(coarseness + Math.ceil(Math.log2(triangles / TRIANGLES)), COARSEST);
+    else if (triangles < 0.4 * TRIANGLES) coarseness = Math.max(coarseness - 1, 0);
+  };
   // The power of two, or of its root, that divides the diagonal of a shape into cells.
   const levelOf = (mesh, camera, height) => {
     const {geometry} = mesh;
@@ -209,7 +229,7 @@ COARSE_WHILE_MOVING = (
     return Math.max(Math.ceil(2 * Math.log2(scale * min.distanceTo(max) / (CELL * pixel))), 2) / 2;
   };
   const levelWhileMoving = (mesh, renderer, camera) =>
-    isMoving(camera) ? levelOf(mesh, camera, renderer.domElement.height) : Infinity;
+    isMoving(camera) ? levelOf(mesh, camera, renderer.domElement.height) - 0.5 * coarseness : Infinity;
   const coarserFor = (mesh, camera, height) => {
     const {geometry} = mesh;
     if (!((geometry.index ?? geometry.attributes.position).count / 3 > LIGHT)) return geometry;
@@ -217,8 +237,13 @@ COARSE_WHILE_MOVING = (
     if (!(level <= LEVELS)) return geometry;
     if (!levels.has(geometry)) levels.set(geometry, new Map());
     const found = levels.get(geometry), {min, max} = geometry.boundingBox;
-    if (!found.has(level)) found.set(level, coarser(geometry, min.distanceTo(max) / 2 ** level));
-    return found.get(level);
+    const at = (level) => {
+      if (!found.has(level)) found.set(level, coarser(geometry, min.distanceTo(max) / 2 ** level));
+      return found.get(level);
+    };
+    const coarse = at(level);
+    const isHeavy = coarseness > 0 && (coarse.index ?? coarse.attributes.position).count / 3 > HEAVY;
+    return isHeavy ? at(Math.max(level - 0.5 * coarseness, 1)) : coarse;
   };
   // A matte surface takes a third of the time of one with gloss, and less where the light is that of its
   // corners. The colours of corners are those of the screen, as pixels between them need no powers then.
@@ -300,15 +325,20 @@ COARSE_WHILE_MOVING = (
   };
   let whole = [];
   const drawCoarsely = (renderer, scene, camera) => {
+    if (!seen) scene.traverseVisible((each) => { seen ||= !!each.material?.isMeshStandardMaterial; });
+    if (seen && !begun) setTimeout(() => { begun = true; }, CHECKS * CHECK_AFTER);
     if (!isMoving(camera)) return;
+    let triangles = 0;
     scene.traverseVisible((mesh) => {
       const {geometry, material} = mesh;
       if (!mesh.isMesh || !isPlain(mesh)) return;
       whole.push([mesh, geometry, material]);
       const coarse = coarserFor(mesh, camera, renderer.domElement.height);
+      if (coarse !== geometry) triangles += coarse.index.count / 3;
       mesh.geometry = material.flatShading ? facetsOf(coarse) : coarse;
       mesh.material = matteOf(material);
     });
+    adjustCoarseness(triangles);
   };
   const drawWhole = () => {
     for (const [mesh, geometry, material] of whole) Object.assign(mesh, {geometry, material});

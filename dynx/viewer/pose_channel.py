@@ -48,15 +48,24 @@ PLACING = (
   };
   const unpack = (queue) => {
     const push = Array.prototype.push;
-    queue.push = (...messages) => push.apply(queue, messages.flatMap(unpacked));
-    queue.push(...queue.splice(0));
+    queue.push = (...messages) => {
+      return push.apply(queue, messages.filter((each) => !isHeld(each)).flatMap(unpacked));
+    };
+    if (queue.length) queue.push(...queue.splice(0));
   };
   // Messages may come as soon as the page has its queue.
   let shown;
   Object.defineProperty(window, "__viserMutable", {
     configurable: true,
     get: () => shown,
-    set: (page) => { if (page && page !== shown) unpack(page.messageQueue); shown = page; },
+    set: (page) => {
+      if (page && page !== shown) {
+        awaitShapes(page);
+        unpack(page.messageQueue);
+        queueMicrotask(prepare);
+      }
+      shown = page;
+    },
   });
 """
 )

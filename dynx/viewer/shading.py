@@ -79,7 +79,8 @@ SHADOWS = (
     if (shadow.parent !== world) world.add(shadow);
     const of = meshes.map((mesh) => {
       const {geometry} = mesh, level = levelWhileMoving(mesh, renderer, camera);
-      const cells = Math.min(2 ** Math.round(level), CELLS);
+      // The outline of a shadow needs half as many cells as a shape with its light.
+      const cells = Math.min(2 ** Math.max(Math.round(level) - 1, 2), CELLS);
       if (!outlines.has(geometry)) outlines.set(geometry, new Map());
       const found = outlines.get(geometry);
       if (!found.has(cells)) found.set(cells, outlined(geometry, cells));

@@ -15,7 +15,8 @@ import pytest
 import dynx
 from dynx.steppers.camera import Camera
 from dynx.viewer import Viewer
-from dynx.viewer.moving_picture import MOVING
+from dynx.viewer.moving_picture import COARSE_WHILE_MOVING, MOVING
+from dynx.viewer.moving_picture import TRIANGLES as COARSE
 from tests.viewer.conftest import PATIENCE, PICTURE, Opened, OpenPage, connected, until
 
 SIZES = """() => {
@@ -155,3 +156,27 @@ def test_a_page_draws_fewer_triangles_while_a_part_moves(
             assert area_and_colour(page) == pytest.approx((area, colour), rel=0.2)
         until(lambda: triangles() >= whole, "the whole ball after the motion")
         assert not page.errors
+
+
+def test_cells_grow_where_many_triangles_move(
+    open_page: OpenPage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = COARSE_WHILE_MOVING.replace(f"const TRIANGLES = {COARSE}", "const TRIANGLES = 500")
+    assert few != COARSE_WHILE_MOVING
+    drawn = []
+    for script in (COARSE_WHILE_MOVING, few):
+        monkeypatch.setattr("dynx.viewer.browser.COARSE_WHILE_MOVING", script)
+        with dynx.load(ball(tmp_path, smooth=True)).view(whole_meshes=False) as viewer:
+            page = open_page(viewer.url)
+            connected(viewer)
+            viewer.look_from(Camera.look_at((1.5, -1.5, 0.6), (0.0, 0.0, 0.0)))
+            until(lambda page=page: page.page.evaluate(TRIANGLES) > 10_000, "the whole ball at rest")
+            page.page.wait_for_timeout(PICTURE)
+            still = area_and_colour(page)
+            with Moving(viewer):
+                until(lambda page=page: 100 < page.page.evaluate(TRIANGLES) < 10_000, "a coarse ball")
+                page.page.wait_for_timeout(PICTURE)
+                drawn.append(page.page.evaluate(TRIANGLES))
+                assert area_and_colour(page) == pytest.approx(still, rel=0.2)
+            assert not page.errors
+    assert drawn[1] < 0.6 * drawn[0]
