@@ -52,6 +52,7 @@ FIRST_PICTURE = (
     page.requestRender();
   };
   const isHeld = (message) => {
+    if (controls && message.type === "ResetGuiMessage") controls.length = 0;
     // The picture keeps its size where the panel has its place before.
     if (!controls || !/^Gui(?!SetPanel|Panel)/.test(message.type)) return false;
     limit ??= setTimeout(addControls, LONGEST);
