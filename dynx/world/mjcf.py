@@ -14,7 +14,7 @@ from dynx.steppers.layout import Layout
 from dynx.steppers.materials import STRICT_MATERIALS, inexact_materials
 from dynx.steppers.settings import checked_settings
 from dynx.steppers.stepper import Stepper
-from dynx.world.preparation import checked_options, may_be_reached, prepare
+from dynx.world.preparation import JointDynamics, checked_options, may_be_reached, prepare
 from dynx.world.scene.scene import Scene
 from dynx.world.sensors.kinds import ForceTorqueSensor
 
@@ -27,10 +27,10 @@ def scene_to_mjcf(
     substeps: int = 1,
     collisions: bool = True,
     joint_limits: bool = True,
-    joint_damping: bool = True,
-    joint_friction: bool = True,
-    joint_armature: bool = True,
-    joint_springs: bool = True,
+    joint_damping: JointDynamics = True,
+    joint_friction: JointDynamics = True,
+    joint_armature: JointDynamics = True,
+    joint_springs: JointDynamics = True,
     **settings: object,
 ) -> str:
     """Return a scene as an MJCF document, complete in itself: the model of its world in MuJoCo.

@@ -39,6 +39,11 @@ SHORTEST_STEP = 1e-9
 """Shortest step of an engine [s]."""
 
 
+JointDynamics = bool
+"""True if joints have the damping, friction, armature or springs of the robot description; a world takes no
+other values. The refusal of a number knows the name (`dynx.argument_types`)."""
+
+
 def checked_options(dt: float, substeps: int, **switches: bool) -> dict[str, Any]:
     """Return the options of a world by name; ArgumentError for an invalid one."""
     seconds, steps = positive_seconds("dt", dt), whole_number("substeps", substeps, 1)

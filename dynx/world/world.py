@@ -43,7 +43,7 @@ from dynx.world.notes import (
     notes_on_start,
     overlaps_of,
 )
-from dynx.world.preparation import checked_options, layout_for, prepare
+from dynx.world.preparation import JointDynamics, checked_options, layout_for, prepare
 from dynx.world.scene.scene import MARGIN, Scene
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
 
@@ -187,10 +187,10 @@ class World:
         substeps: int = 1,
         collisions: bool = True,
         joint_limits: bool = True,
-        joint_damping: bool = True,
-        joint_friction: bool = True,
-        joint_armature: bool = True,
-        joint_springs: bool = True,
+        joint_damping: JointDynamics = True,
+        joint_friction: JointDynamics = True,
+        joint_armature: JointDynamics = True,
+        joint_springs: JointDynamics = True,
         keep_last_step: bool = False,
         contact_interval: float | None = None,
         **settings: object,
