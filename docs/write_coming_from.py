@@ -17,8 +17,9 @@ from dynx.engine_names import TABLES, method_call
 ROOT = Path(__file__).parents[1]
 BEGIN = "<!-- written: calls -->\n"
 END = "<!-- end -->"
-NAME = r"\b(?:dynx|World|Backend|Model|Scene|SceneRobot|PDMotor|Weld|numpy|gymnasium)(?:\.\w+)*"
-CALL = re.compile(NAME + r"(?:\((?:[^()]|\([^()]*\))*\)|\b)|<\w+>")
+OWNER = r"\b(?:dynx|World|Backend|Model|Scene|SceneRobot|PDMotor|Weld|numpy|gymnasium)"
+NAME = OWNER + r"(?:\.\w+|\[\w+\]|\[:\d\])*"
+CALL = re.compile(NAME + r"(?:\((?:[^()]|\([^()]*\))*\)|\b|(?<=\]))|<\w+>")
 
 
 def page_of(library: str) -> str:
@@ -33,7 +34,10 @@ def calls(library: str) -> dict[str, str]:
         if library in quantity.other_names:
             call = method_call(quantity)
             other = quantity.other_names[library]
-            found[other] = f"{found[other]}; {call}" if other in found else call
+            if other not in found:
+                found[other] = call
+            elif f"Backend.{quantity.name}(" not in found[other]:
+                found[other] = f"{found[other]}; {call}"
     return dict(sorted(found.items(), key=lambda item: item[0].lower()))
 
 

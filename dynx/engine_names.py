@@ -21,8 +21,9 @@ _MOTORS = (
     "World.step(torques={robot: tau}); a controller of dynx.control in dynx.simulate, such as "
     "OpenLoop with a table of torques"
 )
-_STATE = "World.state, with robots[name].q and .v"
-_POSE_OF_BODY = "World.state, with bodies[name].T_world_body; the base of a robot is in robots[name].q"
+_POSITIONS, _VELOCITIES = "World.state.robots[name].q", "World.state.robots[name].v"
+_STATE = f"{_POSITIONS} and {_VELOCITIES}"
+_POSE_OF_BODY = f"World.state.bodies[name].T_world_body of a body; {_POSITIONS}[:7] of a floating base"
 _SET_STATE = "World.set_state(...), or SceneRobot(q=..., v=...) at the start"
 _SHAPES = "dynx.world.box, sphere, cylinder, capsule or mesh, in Scene(bodies=...)"
 _CONSTRAINT = "dynx.world.PointToPoint or Weld, in Scene(constraints=...)"
@@ -62,7 +63,7 @@ PYBULLET = {
     "enableJointForceTorqueSensor": "World(scene, keep_last_step=True), then World.joint_wrenches()",
     "getAABB": "World.aabb(part)",
     "getBasePositionAndOrientation": _POSE_OF_BODY,
-    "getBaseVelocity": "World.state, with bodies[name].twist; that of a robot's base is in robots[name].v",
+    "getBaseVelocity": f"World.state.bodies[name].twist of a body; {_VELOCITIES}[:6] of a floating base",
     "getBodyInfo": "Scene.robots and Scene.bodies",
     "getCameraImage": _CAMERA,
     "getClosestPoints": "World.closest_points(a, b)",
@@ -130,6 +131,9 @@ PINOCCHIO = {
     "computeJointJacobians": "Backend.jacobian(q, link, reference='world') of each child link",
     "computeMinverse": "Backend.forward_dynamics(q, v, tau), or numpy.linalg.inv(Backend.mass_matrix(q))",
     "computeRNEADerivatives": "dynx.Derivatives",
+    "computeSupportedForceByFrame": (
+        "Backend.joint_wrenches(q, v, a), which includes the child body of the joint"
+    ),
     "computeTotalMass": "Model.total_mass",
     "difference": "Model.difference(q0, q1)",
     "forwardKinematics": "Backend.forward_kinematics(q, frame)",
@@ -171,14 +175,18 @@ MUJOCO = {
 DRAKE = {
     "AdvanceTo": "World.run(duration)",
     "CalcBiasSpatialAcceleration": "Backend.jacobian_derivative(q, v, frame), times v",
-    "CalcMassMatrixViaInverseDynamics": "Backend.mass_matrix(q)",
+    "CalcInverseDynamics": "Backend.inverse_dynamics(q, v, a), which includes gravity",
+    "CalcMassMatrix": "Backend.mass_matrix(q, joint_dynamics=True)",
+    "CalcMassMatrixViaInverseDynamics": "Backend.mass_matrix(q, joint_dynamics=True)",
+    "CalcPoseInWorld": "Backend.forward_kinematics(q, frame)",
     "CalcRelativeTransform": "Backend.forward_kinematics(q, frame)",
+    "CalcSpatialMomentumInWorldAboutPoint": "Backend.centroidal_momentum(q, v), about the centre of mass",
     "CalcTotalMass": "Model.total_mass",
     "EvalBodyPoseInWorld": "Backend.forward_kinematics(q, frame)",
     "EvalBodySpatialVelocityInWorld": "Backend.frame_velocity(q, v, frame)",
     "GetJointByName": _JOINT_LIMITS,
-    "GetPositions": _STATE,
-    "GetVelocities": _STATE,
+    "GetPositions": _POSITIONS,
+    "GetVelocities": _VELOCITIES,
     "InverseKinematics": "Backend.inverse_kinematics(pose, frame)",
     "MultibodyPlant": "dynx.backend('drake', model) for its dynamics, or World(scene, engine='drake')",
     "SetPositions": _SET_STATE,

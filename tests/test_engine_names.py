@@ -28,6 +28,7 @@ PLACES: dict[str, tuple[str, ...]] = {
     "Drake": (
         "pydrake.multibody.plant:MultibodyPlant",
         "pydrake.multibody.plant",
+        "pydrake.multibody.tree:Frame",
         "pydrake.multibody.inverse_kinematics",
         "pydrake.systems.analysis",
         "pydrake.systems.analysis:Simulator",

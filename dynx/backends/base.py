@@ -410,7 +410,7 @@ class Backend(QuantityCalls):
         component of each follower times the multiplier of the follower. What a joint's damping, friction,
         armature and spring need is not part of it: they act on the side of the motor.
 
-        Featherstone 2008, table 5.1. Elsewhere: Pinocchio `computeSupportedForceByFrame`, Drake
+        Featherstone 2008, table 5.1. Elsewhere: Pinocchio `data.f` after `rnea`, Drake
         `get_reaction_forces_output_port`, MuJoCo `cfrc_int` (of each body, about the centre of mass of the
         tree), PyBullet `getJointState` (of a sensor, after a step).
         """

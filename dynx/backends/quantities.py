@@ -309,9 +309,8 @@ _TABLE = (
         _imported_late("dynx.rbd.joint_wrenches", "joint_wrenches"),
         "joint wrenches",
         "Featherstone 2008, table 5.1",
-        _elsewhere(
-            "computeSupportedForceByFrame", "get_reaction_forces_output_port", "cfrc_int", "getJointState"
-        ),
+        # Pinocchio stores them in `data.f` during `rnea`, and has no function that returns them.
+        _elsewhere(None, "get_reaction_forces_output_port", "cfrc_int", "getJointState"),
         options=_OF_WRENCHES,
     ),
     Quantity(

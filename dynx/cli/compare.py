@@ -95,8 +95,9 @@ class CoordinateEntry(TypedDict):
 
 
 class CauseEntry(TypedDict):
-    """A difference of the scenarios: `alone` is the largest distance from A if it alone is taken over from B,
-    `without` that from B if all others are. Null: not simulated, or infinite; `obstacle` says why."""
+    """A difference of the scenarios: `alone` is the largest distance from A after only this change to A,
+    `without` that from B after all other changes to A. Null: not simulated, or infinite; `obstacle` says why.
+    """
 
     name: str
     first: str
@@ -195,22 +196,22 @@ def show(out: Console, report: Entry) -> None:
 
 
 def verdict(report: Entry) -> str:
-    """Return the first line: whether the rollouts are alike, or why they part."""
+    """Return the first line: whether the rollouts are alike, or why they separate."""
     names = f"{one_line(report['first'])} and {one_line(report['second'])}"
     if report["alike"]:
         apart = f"{_distance(report['largest'])} rad or m apart in {report['duration']:.6g} s"
         return f"{names} are alike: {apart}"
     if report["causes"] and not _is_simulated(report):
-        return f"{names} part; their differences were not simulated"
+        return f"{names} separate; their differences were not simulated"
     acting = sum(each["acts"] for each in report["causes"])
     unknown = sum(_is_unknown(each) for each in report["causes"])
     rest = f"; the effect of {counted(unknown, 'difference')} is not known" if unknown else ""
     causes = counted(acting, "cause") if acting else "all their differences together"
     if report["proved"]:
-        return f"{names} part, for {causes}, proved{rest}"
+        return f"{names} separate: {causes}, proved{rest}"
     if acting:
-        return f"{names} part; {causes}, not proved{rest}"
-    return f"{names} part, for no cause that is known{rest}"
+        return f"{names} separate: {causes}, not proved{rest}"
+    return f"{names} separate: no cause is known{rest}"
 
 
 def _is_simulated(report: Entry) -> bool:
@@ -225,11 +226,11 @@ def _is_unknown(cause: Entry) -> bool:
 def _show_partings(out: Console, report: Entry) -> None:
     if report["alike"]:
         return
-    table = Table("farther apart than", "since [s]", "first", right=("farther apart than", "since [s]"))
+    table = Table("distance above", "from time [s]", "first", right=("distance above", "from time [s]"))
     for each in report["parted"]:
         since = "never" if each["time"] is None else f"{each['time']:.4g}"
         table.add_row(f"{each['distance']:g}", since, one_line(each["name"] or ""))
-    out.print(f"\n{one_line(report['robot'])}, {report['duration']:.6g} s that both have [rad; m]")
+    out.print(f"\n{one_line(report['robot'])}: {report['duration']:.6g} s in common, distances in rad or m")
     out.print(table)
 
 
@@ -259,7 +260,7 @@ def _show_causes(out: Console, report: Entry) -> None:
     causes: Sequence[Entry] = report["causes"]
     if not causes:
         return
-    table = Table("difference", "in A", "in B", "alone", "left by it", "", right=("alone", "left by it"))
+    table = Table("difference", "in A", "in B", "alone", "without it", "", right=("alone", "without it"))
     for each in causes[:MAX_ROWS]:
         word = "cause" if each["acts"] else "not known" if _is_unknown(each) else "no effect"
         if not _is_simulated(report):
@@ -273,8 +274,8 @@ def _show_causes(out: Console, report: Entry) -> None:
             word,
         )
     out.print(
-        "\ndifferences, and the largest distance: from A if this one alone is taken over, "
-        "left to B if all others are"
+        "\nalone: largest distance from A after only this change to A\n"
+        "without it: largest distance from B after all other changes to A"
     )
     out.print(table)
     print_rest(out, len(causes) - MAX_ROWS)
@@ -283,8 +284,8 @@ def _show_causes(out: Console, report: Entry) -> None:
             out.print(f"{one_line(each['name'])}: {one_line(each['obstacle'])}", style="yellow")
     if _is_simulated(report):
         out.print(
-            f"proof: a rerun of A is {_distance(report['repeated'])} from A; with all differences taken over "
-            f"it is {_distance(report['remaining'])} from B (tolerance {report['tolerance']:g})"
+            f"proof: a rerun of A differs from A by {_distance(report['repeated'])}; A with all changes "
+            f"differs from B by {_distance(report['remaining'])} (tolerance {report['tolerance']:g})"
         )
 
 

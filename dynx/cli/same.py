@@ -177,7 +177,7 @@ def _write_mended(report: SameReport, path: str) -> None:
 
 
 def show(out: Console, report: Entry) -> None:
-    """Print the verdict, what differs, what differs apart from the verdict, and what is a freedom."""
+    """Print the verdict, the elements that differ, the other differences and the allowed differences."""
     names = f"{one_line(report['first'])} and {one_line(report['second'])}"
     out.print(f"{names}: {report['verdict']}", style="bold")
     for note in report["notes"]:

@@ -1,5 +1,5 @@
 """What two descriptions of a robot say beside its rigid-body dynamics: limits, joint dynamics, shapes,
-frames, names, gravity. It is listed apart from the verdict."""
+frames, names, gravity. Such differences do not change the verdict."""
 
 from __future__ import annotations
 

@@ -43,9 +43,9 @@ def test_a_cause_is_shown_with_its_proof(folder: Path) -> None:
     result = run(folder / "a.npz", folder / "b.npz")
     assert result.exit_code == 1
     lines = result.output.splitlines()
-    assert lines[0].endswith("b.npz part, for 1 cause, proved")
+    assert lines[0].endswith("b.npz separate: 1 cause, proved")
     assert any(line.split()[0] == "payload" and line.endswith("cause") for line in lines if line.strip())
-    assert "a rerun of A is 0 from A; with all differences taken over it is 0 from B" in lines[-1]
+    assert "a rerun of A differs from A by 0; A with all changes differs from B by 0" in lines[-1]
 
 
 def test_the_document(folder: Path) -> None:
@@ -86,9 +86,9 @@ def test_unusable_input(folder: Path) -> None:
 def test_verdicts_without_a_proof(folder: Path) -> None:
     ours, theirs = (dynx.Rollout.load(folder / name) for name in ("a.npz", "b.npz"))
     listed = document(compare(ours, theirs, rerun=False), "a", "b")
-    assert verdict(listed) == "a and b part; their differences were not simulated"
+    assert verdict(listed) == "a and b separate; their differences were not simulated"
     log = dynx.Rollout.load(folder / "log.csv", ARM)
-    assert verdict(document(compare(ours, log), "a", "b")) == "a and b part, for no cause that is known"
+    assert verdict(document(compare(ours, log), "a", "b")) == "a and b separate: no cause is known"
 
 
 def test_a_verdict_says_which_effects_are_not_known(folder: Path) -> None:
@@ -98,14 +98,14 @@ def test_a_verdict_says_which_effects_are_not_known(folder: Path) -> None:
     small = {**payload, "alone": 1e-12, "without": 1e-12, "acts": False}
     unknown = {**small, "without": None}
     for causes, said in (
-        ([payload, small], "a and b part, for 1 cause, proved"),
-        ([small, small], "a and b part, for all their differences together, proved"),
-        ([payload, unknown], "a and b part, for 1 cause, proved; the effect of 1 difference is not known"),
+        ([payload, small], "a and b separate: 1 cause, proved"),
+        ([small, small], "a and b separate: all their differences together, proved"),
+        ([payload, unknown], "a and b separate: 1 cause, proved; the effect of 1 difference is not known"),
     ):
         assert verdict({**report, "causes": causes}) == said
     part = {**report, "proved": False}
-    assert verdict({**part, "causes": [payload]}) == "a and b part; 1 cause, not proved"
-    assert verdict({**part, "causes": [small]}) == "a and b part, for no cause that is known"
+    assert verdict({**part, "causes": [payload]}) == "a and b separate: 1 cause, not proved"
+    assert verdict({**part, "causes": [small]}) == "a and b separate: no cause is known"
     console = Console(record=True, width=200)
     show(console, {**report, "causes": [payload, small, unknown]})
     words = [line.rstrip() for line in console.export_text().splitlines() if line.startswith(" payload")]

@@ -171,7 +171,11 @@ def main() -> None:
     """Print the tables."""
     coefficients = (0.0, 0.1, 0.5, 1.5)
     print(
-        "| friction of the two | mean | " + " | ".join(WORLDS) + " |\n" + "|---|---|" + "---|" * len(WORLDS)
+        "| friction of the two | geometric mean (expected) | "
+        + " | ".join(WORLDS)
+        + " |\n"
+        + "|---|---|"
+        + "---|" * len(WORLDS)
     )
     for k, a in enumerate(coefficients):
         for b in coefficients[k:]:
@@ -184,7 +188,10 @@ def main() -> None:
     steps = (4e-3, 2e-3, 1e-3)
     heads = [f"{engine}, {1e3 * dt:g} ms" for engine in engines for dt in steps]
     print(
-        "\n| restitution of the two | height | " + " | ".join(heads) + " |\n|---|---|" + "---|" * len(heads)
+        "\n| restitution of the two | expected height | "
+        + " | ".join(heads)
+        + " |\n|---|---|"
+        + "---|" * len(heads)
     )
     for one, other in ((0.0, 1.0), (0.2, 0.2), (0.25, 1.0), (0.8, 0.8), (1.0, 1.0)):
         row = [f"{one:g}, {other:g}", f"{one * other:.3f}"]

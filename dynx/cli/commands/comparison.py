@@ -212,8 +212,8 @@ def same() -> None:
     A and B are names (see `dynx robots`), URDF, xacro, MJCF or SDF files. Links are merged across fixed
     joints; frames of links, signs of axes and inertia that no state shows make no difference. Where the
     robots differ, the fewest elements of B are listed that make them the same when replaced by those of A.
-    Limits, joint dynamics, shapes, frames and names are listed apart from the verdict. So are contact filters
-    and actuators where both files are MJCF, since URDF and SDF leave them open.
+    Other differences do not change the verdict: limits, joint dynamics, shapes, frames and names, and for two
+    MJCF files contact filters and actuators, which URDF and SDF leave open.
 
     Exit code 0 if it is the same robot (or differs only as the baseline allows, or a baseline was written),
     1 if not, mended or not, 2 if A or B cannot be used, or B is to be mended and cannot be.

@@ -218,13 +218,13 @@ def compare() -> None:
     A and B are files of rollouts: .npz (dynx sim --save), .mcap of dynx, or .csv, which may be a log of your
     own robot: a column t [s], and q:JOINT for each joint, with v:JOINT and tau:JOINT where they are known.
 
-    The report gives the times at which the rollouts part, and every difference of their scenarios: settings,
-    gains, links and joints of the robot. Each is taken over from B into A alone and simulated again (the
-    effect alone), and so are all but this one (the distance that this one leaves). With all of them A must
-    be B, which proves that nothing else is a cause.
+    The report gives the times at which the rollouts separate, and every difference of their scenarios:
+    settings, gains, links and joints of the robot. For each difference, dynx simulates A with only this
+    change (alone), and A with all changes except this one (without it). A with all changes must equal B,
+    which proves that nothing else is a cause.
 
-    Exit code 0 if the rollouts are alike, 1 if they part, 2 for files that cannot be compared. Ctrl-C ends
-    the run with exit code 130.
+    Exit code 0 if the rollouts are alike, 1 if they separate, 2 for files that cannot be compared.
+    Ctrl-C ends the run with exit code 130.
 
     \b
     Examples:

@@ -21,7 +21,7 @@ class SameBaseline(KnownDifferences):
     """The known differences of pairs. Files are relative to `folder`, where that of the baseline is."""
 
     def compare(self, report: SameReport) -> BaselineComparison:
-        """Compare a report; what is apart from the verdict does not count."""
+        """Compare a report; differences that do not change the verdict do not count."""
         keys = [robot_key(name, self.folder) for name in (report.second, report.first)]
         found = differences(report, self.folder)
         return self.compare_differences(found, (keys[0], base_of(report), keys[1]))

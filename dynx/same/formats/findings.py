@@ -1,5 +1,5 @@
-"""Differences of a `SameReport` in one list: elements, joints without counterpart, and what is apart from the
-verdict."""
+"""Differences of a `SameReport` in one list: elements, joints without counterpart, and other differences,
+which do not change the verdict."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RULES: dict[str, str] = {
     "joint-moved": "A joint has another type or another parent in the second description.",
     "base": "One base is fixed, the other floating.",
 } | {
-    kind.replace(" ", "-"): f"The {kind} of a joint or link differs, apart from the verdict."
+    kind.replace(" ", "-"): f"The {kind} of a joint or link differs, which does not change the verdict."
     for kind in get_args(Kind)
 }
 """What each rule of a finding says, by its identity."""
@@ -30,7 +30,8 @@ RULES: dict[str, str] = {
 
 @dataclass(frozen=True)
 class SameFinding:
-    """A difference of two descriptions at an element of each; `level` is ``note`` apart from the verdict.
+    """A difference of two descriptions at an element of each; `level` is ``note`` if the verdict does not
+    depend on it.
 
     `size` is relative to the scale of what differs, infinite for a joint without counterpart.
     """

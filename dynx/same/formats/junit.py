@@ -1,5 +1,5 @@
 """Differences of two descriptions as JUnit XML: a case for each element that differs, and one for each rule
-apart from the verdict, which passes with its text as output."""
+whose differences do not change the verdict, which passes with its text as output."""
 
 from __future__ import annotations
 
@@ -39,4 +39,4 @@ def _cases(report: SameReport, baseline: SameBaseline | None) -> Iterator[tuple[
     for rule, messages in apart.items():
         output = Element("system-out")
         output.text = "\n".join(messages)
-        yield f"{rule}, apart from the verdict", output
+        yield f"{rule}, which does not change the verdict", output

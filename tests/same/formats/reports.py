@@ -43,7 +43,7 @@ def alike() -> SameReport:
 
 @cache
 def differing() -> SameReport:
-    """Return a report with elements that differ, and damping apart from the verdict."""
+    """Return a report with elements that differ, and damping, which does not change the verdict."""
     return same_robot(FIRST, SECOND)
 
 
