@@ -30,7 +30,7 @@ def described(folder: Path, name: str, text: str) -> RobotFile:
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
-    found = describe(("somebody/arms", "c", name, str(path)))
+    found = describe(("nobody/machines", "c", name, str(path)))
     assert found is not None
     return found
 
@@ -56,7 +56,7 @@ def test_a_file_gets_the_urdf_file_of_its_robot(tmp_path: Path) -> None:
     mjcf = described(tmp_path, "six_axis/mjcf/arm.xml", ARM.to_mjcf())
     (pair,) = choose([other, urdf, mjcf])
     assert (pair.path, pair.other_path) == (urdf.path, mjcf.path)
-    assert describe(("somebody/arms", "c", "none.xml", str(tmp_path / "six_axis/arm.urdf"))) is not None
+    assert describe(("nobody/machines", "c", "none.xml", str(tmp_path / "six_axis/arm.urdf"))) is not None
 
 
 @pytest.mark.parametrize("part", ["same", "mass", "axis"])

@@ -6,7 +6,8 @@ The first line names the columns, in this order; ``c`` stands for each coordinat
 |---|---|---|
 | `t` | time | s |
 | `q:c`, `v:c` | position, velocity | rad, m, per second |
-| `q*:c`, `v*:c`, `a*:c`, `error:c` | reference and error, if there is a reference | likewise |
+| `q*:c`, `v*:c`, `a*:c` | reference, if there is one | rad, m, per second, per second squared |
+| `error:c` | tracking error, if there is a reference | rad, m |
 | `energy` | kinetic and potential | J |
 | `a:c`, `tau:c` | acceleration and torque in the step that starts at this time | per second squared; N m, N |
 | `saturated:c` | 1 if the motor was at its limit in that step, otherwise 0 | |

@@ -18,10 +18,10 @@ A floating base adds these topics. Its pose is in the frame ``world`` (``map`` i
 |---|---|---|
 | `/tf` | tf2_msgs/TFMessage | the pose of the root link |
 | `/base/odometry` | nav_msgs/Odometry | pose and velocity; covariances are 0 |
-| `/base/acceleration` | geometry_msgs/AccelStamped | the derivative of that velocity |
+| `/base/acceleration` | geometry_msgs/AccelStamped | derivative of the velocity in `/base/odometry` |
 | `/base/wrench` | geometry_msgs/WrenchStamped | wrench of the controller on the base, which has no motor |
 | `/base/reference` | nav_msgs/Odometry | reference pose and velocity |
-| `/base/reference_acceleration` | geometry_msgs/AccelStamped | likewise |
+| `/base/reference_acceleration` | geometry_msgs/AccelStamped | reference acceleration |
 | `/base/error` | geometry_msgs/TwistStamped | the displacement [m, rad] from the base to the reference |
 
 A rollout in a scene adds a topic for each body and link that touches something; characters that ROS does not
@@ -29,7 +29,7 @@ allow in names become ``_``:
 
 | topic | type | content |
 |---|---|---|
-| `/contacts/NAME` | geometry_msgs/WrenchStamped | sum of the contact forces on it, in world axes |
+| `/contacts/NAME` | geometry_msgs/WrenchStamped | sum of the contact forces on the part, in world axes |
 
 Each sensor of `Rollout.sensors` adds a topic of its samples. They are logged when they can be read; the stamp
 of their header is the time at which they were taken, and its frame is called like the sensor:
@@ -37,9 +37,9 @@ of their header is the time at which they were taken, and its frame is called li
 | topic | type | content |
 |---|---|---|
 | `/sensors/NAME` | sensor_msgs/Imu | the sample of an IMU, with the covariances of its white noise |
-| `/sensors/NAME` | geometry_msgs/WrenchStamped | force and torque; of a contact sensor the force alone |
-| `/sensors/NAME` | sensor_msgs/JointState | the angle of an encoder; of a joint torque the effort |
-| `/sensors/NAME` | std_msgs/Float64 | distance of a ray |
+| `/sensors/NAME` | geometry_msgs/WrenchStamped | force, and torque of a force-torque sensor |
+| `/sensors/NAME` | sensor_msgs/JointState | position and velocity, or effort, of the joint |
+| `/sensors/NAME` | std_msgs/Float64 | distance of a ray sensor |
 
 Every number is the float64 of the record. The torque of a step is stamped with the time at which the step
 begins, so the last state has no effort. Mimic joints are not listed, because the description defines how they
