@@ -85,6 +85,7 @@ def test_each_step_is_short_and_has_a_picture_a_comparison_and_an_answer(path: P
         assert wanted in page, wanted
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("path", STEPS, ids=lambda path: path.stem)
 def test_each_step_runs_alone_as_a_notebook_and_prints_what_it_shows(path: Path, tmp_path: Path) -> None:
     """Each in a process of its own: raw calls of PyBullet act on the first client of their process."""

@@ -99,6 +99,7 @@ REAL = [
 """A chain, one with a mimic joint, whose accelerations are not compared, and a tree."""
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(("name", "base"), REAL)
 def test_real_robots_against_pinocchio(name: str, base: Base) -> None:
     model = dynx.load(name, base=base)
@@ -191,6 +192,7 @@ def _refuse(*_: object) -> None:
     raise AssertionError("nothing is to be compiled")
 
 
+@pytest.mark.long_cases
 @each_model
 def test_forward_undoes_inverse(model: Model) -> None:
     """d/dx of ID(q, v, FD(q, v, tau)) = tau."""

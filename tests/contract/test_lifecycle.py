@@ -80,6 +80,7 @@ def test_a_failed_call_leaves_nothing_behind(make: Make) -> None:
         np.testing.assert_array_equal(engine_call.evaluate(engine, state), before)
 
 
+@pytest.mark.long_cases
 def test_several_threads_at_once(make: Make) -> None:
     """Each thread makes every call, for every robot, in another order."""
     engines = [make(model) for model in MODELS]

@@ -107,6 +107,7 @@ def test_a_stated_omission_is_that_of_the_trap(rule: Any) -> None:
     assert all(each.no_results is None and max(each.before.values()) <= BAR for each in report.engines)
 
 
+@pytest.mark.long_cases
 @needs_all
 @pytest.mark.parametrize("rule", ["DX309", "DX601", "DX602", "DX605", "DX607", "DX608"])
 def test_the_cause_of_a_trap_is_named_with_its_line(rule: str) -> None:

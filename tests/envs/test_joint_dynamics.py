@@ -189,6 +189,7 @@ def limited(robot: Model, q: Array, width: float) -> Model:
     return replace(robot, joints=tuple(joints))
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("width", [2e-3, -0.1], ids=["within", "beyond"])
 def test_joints_stop_at_their_limits(base: Base, width: float) -> None:

@@ -98,6 +98,7 @@ def robots_in_states(
     return model, samples_at(model, q, v, a, tau, wrench=draw(wrenches()), frame=frame, references=1)
 
 
+@pytest.mark.long_cases
 @each_base
 @pytest.mark.parametrize("kind", KINDS)
 @given(data=st.data())

@@ -57,6 +57,7 @@ def test_errors_that_are_not_random_are_their_closed_forms() -> None:
     check(worst, "errors")
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("name", ["a1", "ur5_gripper", "scenes"])
 def test_documents_read_in_mujoco_alone_as_in_the_world(name: str) -> None:
     worst: Worst = {}

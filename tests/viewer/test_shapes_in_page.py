@@ -137,6 +137,7 @@ def step_at_the_ridge(viewer: Viewer) -> float:
     return float(abs(column[middle - 4] - column[middle + 4]) / max(whole, 1.0))
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("smooth", [True, False])
 @pytest.mark.parametrize("software", [True, False])
 def test_an_edge_is_as_sharp_as_its_file_says(

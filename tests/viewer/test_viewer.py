@@ -473,6 +473,7 @@ def test_notes_on_a_motion_name_the_robot_once() -> None:
 SAMPLE = ("double_pendulum", "hyq", "tiago", "icub_reduced")
 
 
+@pytest.mark.long_cases
 @needs_examples
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("name", SAMPLE)

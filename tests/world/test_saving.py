@@ -41,6 +41,7 @@ with World.read(sys.argv[1]) as world:
 """
 
 
+@pytest.mark.long_cases
 def test_a_saved_world_continues_bit_for_bit(engine: str, tmp_path: Path) -> None:
     with World(crowd(), engine) as world:
         final(world, 100)

@@ -175,6 +175,7 @@ def test_a_baseline_accepts_known_differences_and_no_others(arm: Path) -> None:
     assert "gone: DX101 link 'camera'" in other.stdout
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("options", "code"),
     [

@@ -90,6 +90,7 @@ def error_of_unit_mass(link: str) -> Difference:
     return difference
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize(
     ("robot", "link", "joint"),

@@ -33,6 +33,7 @@ def boxes(draw: st.DrawFn) -> tuple[SceneBody, ...]:
     return tuple(bodies)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("name", ARMS)
 def test_solutions_keep_their_margins_by_another_engine(name: str) -> None:
     compiled, frame = engine(name), ARMS[name]

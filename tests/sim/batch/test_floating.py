@@ -48,6 +48,7 @@ def falling(model: Model, seed: int = 0) -> dict[str, Any]:
     return {"q0": q0, "v0": v0}
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("name", ["solo12", "a1", "talos"])
 def test_a_rollout_is_that_of_simulate(name: str) -> None:
     model = dynx.load(name, base="floating")
@@ -61,6 +62,7 @@ def test_a_rollout_is_that_of_simulate(name: str) -> None:
     assert many.worst[0] == many.max_error[0].max()
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     "law",
     [

@@ -221,6 +221,7 @@ def test_readings_do_not_depend_on_how_many_steps_a_call_takes(engine: str, subs
     assert t == 19 * 1e-3 + (substeps - 1) * h
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("engine", WORLDS)
 def test_a_saved_world_continues_with_its_readings_bit_for_bit(engine: str, tmp_path: Path) -> None:
     """With a delay over several samples, rates that do not divide that of the steps, and walking biases."""
