@@ -53,8 +53,10 @@ LONGEST = (
     "tests/properties/",
     "tests/surveys/test_raw_engines.py",
     "tests/test_benchmarks_run.py",
+    "tests/testing/test_scenes.py::test_every_sort_occurs",
+    "tests/viewer/",
 )
-"""Beginnings of the names of tests that take up to a minute each."""
+"""Beginnings of the names of tests that take up to a minute each, or wait for a browser."""
 
 
 CASES, LONG_CASES = 5, 2

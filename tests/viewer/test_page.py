@@ -111,10 +111,13 @@ def test_sliders_buttons_and_keys_reach_the_program(open_page: OpenPage) -> None
         again.page.get_by_role("button", name="random").click()
         until(lambda: not np.array_equal(viewer.view.q, moved), "the button")
         again.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        # The button is made anew with the new positions; what it said before would be lost.
+        text = f"q = np.array({viewer.view.q.tolist()})"
+        holds = "text => [...document.querySelectorAll('button')].some(b => b.dataset.text === text)"
+        again.page.wait_for_function(holds, arg=text)
         again.page.get_by_role("button", name="copy").click()
         again.page.get_by_role("button", name="copied").wait_for()
-        copied = again.page.evaluate("navigator.clipboard.readText()")
-        assert copied == f"q = np.array({viewer.view.q.tolist()})"
+        assert again.page.evaluate("navigator.clipboard.readText()") == text
 
         pressed: list[str] = []
         viewer.on_key("k", lambda: pressed.append("k"))
