@@ -36,7 +36,6 @@ _VIEW = "World.view(), a page in the browser"
 _CLOSE = "World.close(), or a with block"
 _START = "World(scene, engine='pybullet'), without a window; World.view shows it"
 _SETTINGS = "an option of World(scene, ...), such as dt, substeps or a setting of the engine"
-_MATERIAL = "dynx.world.Material of a body or a link, in the Scene"
 _LOADED = "dynx.load(path)"
 _EULER = "roll, pitch, yaw [rad]"
 
@@ -48,9 +47,10 @@ PYBULLET = {
     "applyExternalTorque": _FORCE,
     "calculateInverseKinematics": "Backend.inverse_kinematics(pose, frame)",
     "calculateInverseKinematics2": "Backend.inverse_kinematics({frame: pose, ...})",
-    "changeConstraint": _CONSTRAINT,
-    "changeDynamics": f"{_MATERIAL}; the element <dynamics> of a joint in the URDF, for a World; the "
-    "arguments joint_damping, mass_scale and payload of dynx.simulate; link_damping, a setting of World",
+    "changeConstraint": "a Scene with the changed constraint, in a new World",
+    "changeDynamics": "friction: dynx.world.Material of a body or a link, in the Scene; damping of joints: "
+    "<dynamics> in the URDF for a World, joint_damping in dynx.simulate; masses: mass_scale and payload in "
+    "dynx.simulate; damping of links: link_damping, a setting of World",
     "computeProjectionMatrixFOV": _CAMERA,
     "computeViewMatrix": _CAMERA,
     "computeViewMatrixFromYawPitchRoll": _CAMERA,
@@ -78,12 +78,12 @@ PYBULLET = {
     "getLinkStates": "Backend.forward_kinematics(q, frames)",
     "getMatrixFromQuaternion": "dynx.rotation_from_quat(quat_xyzw)",
     "getNumBodies": "Scene.robots and Scene.bodies",
-    "getNumJoints": "Model.nv, with names in Model.joint_names; Model.joints also has the fixed ones",
+    "getNumJoints": "`len(Model.joints)`, with fixed joints; Model.joint_names lists the joints that move",
     "getOverlappingObjects": "World.overlapping(lower, upper)",
     "getPhysicsEngineParameters": "World.options and World.settings",
     "getQuaternionFromEuler": f"dynx.quat_from_rpy(rpy): {_EULER}, result x, y, z, w",
     "getVisualShapeData": "Model.geometry",
-    "invertTransform": "numpy.linalg.inv(T) of a pose (4, 4), or the transposed rotation",
+    "invertTransform": "numpy.linalg.inv(T) of a pose (4, 4); the transpose of a rotation (3, 3)",
     "loadMJCF": "dynx.load(path) for a robot; MJCF is written by Model.to_mjcf and World.to_mjcf",
     "loadSDF": "dynx.load(path) for a robot",
     "loadURDF": f"{_LOADED}, and dynx.world.SceneRobot(name, model) in a Scene",
@@ -91,7 +91,7 @@ PYBULLET = {
     "rayTest": "World.cast_rays(origins, directions)",
     "rayTestBatch": "World.cast_rays(origins, directions)",
     "removeBody": "a Scene without the body, in a new World",
-    "removeConstraint": _CONSTRAINT,
+    "removeConstraint": "a Scene without the constraint, in a new World",
     "resetBasePositionAndOrientation": _SET_STATE,
     "resetBaseVelocity": _SET_STATE,
     "resetDebugVisualizerCamera": _VIEW,
@@ -101,7 +101,7 @@ PYBULLET = {
     "restoreState": "World.restore(snapshot)",
     "saveBullet": _SAVE,
     "saveState": _SAVE,
-    "setAdditionalSearchPath": "dynx.load(path, package_dirs=[...]); pybullet_data is searched by itself",
+    "setAdditionalSearchPath": "dynx.load(path, package_dirs=[...]); pybullet_data needs no such path",
     "setCollisionFilterGroupMask": "Scene.ignored, pairs of parts that do not touch",
     "setCollisionFilterPair": "Scene.ignored, pairs of parts that do not touch",
     "setGravity": "gravity=(0, 0, -9.81) of Scene, or of dynx.load",
@@ -175,11 +175,13 @@ MUJOCO = {
 DRAKE = {
     "AdvanceTo": "World.run(duration)",
     "CalcBiasSpatialAcceleration": "Backend.jacobian_derivative(q, v, frame), times v",
-    "CalcInverseDynamics": "Backend.inverse_dynamics(q, v, a), which includes gravity",
+    "CalcInverseDynamics": "Backend.inverse_dynamics(q, v, a, joint_dynamics=True), which includes gravity, "
+    "damping and dry friction",
     "CalcMassMatrix": "Backend.mass_matrix(q, joint_dynamics=True)",
     "CalcMassMatrixViaInverseDynamics": "Backend.mass_matrix(q, joint_dynamics=True)",
     "CalcPoseInWorld": "Backend.forward_kinematics(q, frame)",
-    "CalcRelativeTransform": "Backend.forward_kinematics(q, frame)",
+    "CalcRelativeTransform": "`numpy.linalg.inv(T_WA) @ T_WB`, with both poses by "
+    "Backend.forward_kinematics(q, frame)",
     "CalcSpatialMomentumInWorldAboutPoint": "Backend.centroidal_momentum(q, v), about the centre of mass",
     "CalcTotalMass": "Model.total_mass",
     "EvalBodyPoseInWorld": "Backend.forward_kinematics(q, frame)",

@@ -274,8 +274,8 @@ def _show_causes(out: Console, report: Entry) -> None:
             word,
         )
     out.print(
-        "\nalone: largest distance from A after only this change to A\n"
-        "without it: largest distance from B after all other changes to A"
+        "\nalone: A with only this change, and its largest distance from A\n"
+        "without it: A with all changes except this one, and its largest distance from B"
     )
     out.print(table)
     print_rest(out, len(causes) - MAX_ROWS)

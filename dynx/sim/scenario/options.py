@@ -250,7 +250,10 @@ FLAG = Flag("True or False", bool)
 PLANT = PlantKind("the name of a backend or plant, or a ScenePlant", str | dict[str, Any])
 CONFIGURATION = Coordinates("(nq,)", NumberOrArray)
 VELOCITY = Coordinates("(nv,)", NumberOrArray)
-_JOINT_VALUES = "True for the description's, one number, one for each joint, or numbers by joint"
+_JOINT_VALUES = (
+    "True (values of the description); one number for all joints; one number for each joint; "
+    "or a dict of numbers by joint name"
+)
 COEFFICIENTS = JointNumbers(_JOINT_VALUES, NumberOrArray)
 LIMITS = JointNumbers(_JOINT_VALUES, NumberOrArray, others=math.inf)
 FACTORS = Factors("a factor, or factors by link", float | dict[str, Any])
@@ -483,7 +486,7 @@ class SimulationOptions:
     )
     joint_limits: bool = option(
         True,
-        "Inelastic stops at the position limits of the joints; in a scene those of its engine",
+        "Inelastic stops at the position limits of the joints; in a scene the stops of its engine",
         kind=FLAG,
         group=JOINTS,
     )
@@ -492,7 +495,7 @@ class SimulationOptions:
     )
     mass_scale: MassScale = option(
         1.0,
-        "Factor for the masses and inertias of all links, or of one, unknown to the controller",
+        "Factor for the masses and inertias of all links, or factors by link, unknown to the controller",
         kind=FACTORS,
         group=ERRORS,
     )
