@@ -125,7 +125,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class PairResult:
-    """What dynx and the engines say of a pair. `largest` is the largest size of a difference."""
+    """Verdicts of dynx and of the engines on a pair. `largest` is the largest size of a difference."""
 
     pair: Pair
     word: str
@@ -140,7 +140,7 @@ class PairResult:
     engines: float | None = None
     """Relative difference that engines see; None where they cannot say."""
     mended: float | None = None
-    """That of the first robot and the mended second one."""
+    """Relative difference that engines see between the first robot and the mended second one."""
     put_back: int = 0
     """Number of elements that were reinserted alone."""
     unreal: tuple[str, ...] = ()
@@ -281,8 +281,8 @@ def read_pairs() -> list[Pair]:
 
 @dataclass(frozen=True)
 class Seen:
-    """What an engine sees of a robot: joint-space inertias at the states, and total mass, which is seen only
-    if the base floats."""
+    """Joint-space inertias of a robot in an engine at the states, and its total mass [kg], which engines
+    show only where the base floats."""
 
     mass: float
     inertias: tuple[Any, ...]

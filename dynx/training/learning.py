@@ -55,7 +55,7 @@ class Progress:
 @checks_types
 @dataclass(frozen=True)
 class Schedule:
-    """What a run does beside training, and the return at which it ends early.
+    """Schedule of checkpoints and evaluations of a training run, and the return at which the run ends early.
 
     Steps between checkpoints and between evaluations (None: `CHECKPOINTS_PER_RUN` and `EVALUATIONS_PER_RUN`
     in all), episodes of an evaluation, threads of PyTorch, and whether curves are written for TensorBoard.

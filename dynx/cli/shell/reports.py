@@ -31,7 +31,7 @@ class OutputFiles:
     sarif: str | None = None
     baseline: str | None = None
     github: bool = False
-    """Whether standard output has the findings as annotations of GitHub Actions, too."""
+    """True if the command also prints the findings as annotations of GitHub Actions."""
 
     def check(self) -> None:
         """Raise ArgumentError for a path that cannot be written, or that is given twice."""

@@ -360,8 +360,9 @@ class SharedNameOfSdf(EditingRule):
       "visual with name[visual] already exists".
     - PyBullet 3.2.7 (``loadSDF``) loads it.
 
-    What to do: give the second part another name. ``dynx doctor --fix`` does so, in mimic joints too;
-    programs that look a joint up by its name must be changed with it.
+    What to do: give the second part another name. ``dynx doctor --fix`` does so for joints and shapes, in
+    mimic joints too. Programs that look a joint up by its name must be changed with it. Names that frames
+    share with links are not looked for.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)

@@ -25,7 +25,7 @@ RULES: dict[str, str] = {
     kind.replace(" ", "-"): f"The {kind} of a joint or link differs, which does not change the verdict."
     for kind in get_args(Kind)
 }
-"""What each rule of a finding says, by its identity."""
+"""Meaning of each rule of `dynx same`, by the identifier of the rule."""
 
 
 @dataclass(frozen=True)
