@@ -45,7 +45,7 @@ def view(
     play: bool,
     dark: bool,
     host: str,
-    port: int,
+    port: int | None,
     no_browser: bool,
     export_path: str | None,
 ) -> int:

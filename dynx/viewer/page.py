@@ -72,14 +72,15 @@ class _FirstView(NamedTuple):
 class Page:
     """A page in the browser, served until `close`.
 
-    It listens on the loopback interface unless `host` names another; with the port 0 a free one is chosen.
+    It listens on the loopback interface unless `host` names another. Without a port it listens on 8080, or on
+    the next one that is free; with the port 0 the system chooses one.
     Requests need the token of its address, and come from the page itself (`Access`).
     """
 
     def __init__(
         self,
         host: str = DEFAULT_HOST,
-        port: int = DEFAULT_PORT,
+        port: int | None = None,
         *,
         title: str = "dynx",
         dark: bool = False,
@@ -92,21 +93,24 @@ class Page:
         Raises ArgumentError for a port that is taken and a host that is not of this machine."""
         if not isinstance(host, str) or not host:
             raise ArgumentError(f"host is {shown(host)}; wanted an address of this machine")
-        wanted = whole_number("port", port, 0)
+        wanted = DEFAULT_PORT if port is None else whole_number("port", port, 0)
         if wanted > 65535:
             raise ArgumentError(f"port is {wanted}; wanted 0 to 65535")
-        self.host, self.port = host, _free_port(host, wanted)
+        _check_can_listen(host, 0 if port is None else wanted)
+        self.host = host
         self._client = Client(title, antialiasing=not plain)
         self._access = Access(self.host)
         headers = self._client.headers
         self._server = serve(
             self.host,
-            self.port,
+            wanted,
             title,
             self._client.folder,
             lambda answer: self._access.guard(answer, headers),
             CheckedMessages,
         )
+        # viser goes on to the next port from one that is taken.
+        self.port: int = self._server.get_port()
         self.plain, self.dark = plain, dark
         """True for a page drawn as software does fastest, and for a dark page."""
         self._furnish()
@@ -347,8 +351,8 @@ class Page:
         )
 
 
-def _free_port(host: str, port: int) -> int:
-    """Return the port, or a free one for 0. Raises ArgumentError for one that cannot be listened on."""
+def _check_can_listen(host: str, port: int) -> None:
+    """Raise ArgumentError for a port that cannot be listened on, 0 for any, and for a host of no machine."""
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
     except (OSError, UnicodeError) as error:
@@ -361,7 +365,6 @@ def _free_port(host: str, port: int) -> int:
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind((host, port))
-            return int(probe.getsockname()[1])
     except OSError as error:
         reason = error.strerror or str(error)
         remedy = (

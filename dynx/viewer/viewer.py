@@ -26,7 +26,7 @@ from dynx.steppers.camera import Camera
 from dynx.viewer.appearance import PartVisibility, SavedViews, camera_of, look_from
 from dynx.viewer.controls import Controls
 from dynx.viewer.drawn_robot import DrawnParts, Look
-from dynx.viewer.page import DEFAULT_HOST, DEFAULT_PORT, Page
+from dynx.viewer.page import DEFAULT_HOST, Page
 from dynx.viewer.recording import RecordingControls
 from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 from dynx.world.scenery import DARK, LIGHT
@@ -325,13 +325,14 @@ class Viewer(Controls):
         shown: object,
         *,
         host: str = DEFAULT_HOST,
-        port: int = DEFAULT_PORT,
+        port: int | None = None,
         dark: bool = False,
         whole_meshes: bool | None = None,
         open_browser: bool = False,
         **options: Any,
     ) -> None:
-        """The page listens on `host` and `port`; with port 0 a free one is chosen.
+        """The page listens on `host` and `port`, by default on 8080 or the next port that is free; the system
+        chooses one for port 0.
 
         `whole_meshes` draws every triangle; by default heavy meshes are reduced where this machine has no
         graphics processor. Raises the errors of what is shown, ArgumentError for a port that is taken, and

@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import subprocess
 import sys
+import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -86,6 +87,14 @@ def test_a_port_that_is_taken_is_told(arm: Model) -> None:
         port = taken.getsockname()[1]
         with pytest.raises(ArgumentError, match=f"port {port} of '127.0.0.1' cannot be listened on"):
             Viewer(arm, port=port)
+
+
+def test_without_a_port_the_page_takes_the_next_one_that_is_free(arm: Model) -> None:
+    with Viewer(arm) as first, Viewer(arm) as second:
+        assert 8080 <= first.page.port < second.page.port
+        assert f":{second.page.port}/" in second.url
+        with urllib.request.urlopen(second.url, timeout=10.0) as answer:
+            assert answer.status == 200
 
 
 @pytest.mark.parametrize(

@@ -291,9 +291,7 @@ def compare() -> None:
     click.option(
         "--port",
         type=click.IntRange(0, 65535),
-        default=8080,
-        show_default=True,
-        help="Port to listen on; 0 for any that is free.",
+        help="Port to listen on; 0 for any that is free. Without it, 8080 or the next one that is free.",
     ),
     click.option("--no-browser", is_flag=True, help="Print the address, and open no browser."),
     click.option(
