@@ -141,7 +141,7 @@ class PairResult:
     """Relative difference that engines see; None where they cannot say."""
     mended: float | None = None
     """Relative difference that engines see between the first robot and the mended second one."""
-    put_back: int = 0
+    reinserted: int = 0
     """Number of elements that were reinserted alone."""
     unreal: tuple[str, ...] = ()
     """Those of them without effect."""
@@ -442,7 +442,7 @@ def judged(result: PairResult, report: SameReport, text: str, other: str) -> Pai
         result = replace(result, mended=first.difference(mended))
         effects = dict(_effects(report, floating, names, theirs))
         unreal = tuple(name for name, size in effects.items() if size <= SEEN)
-        result = replace(result, put_back=len(effects), unreal=unreal)
+        result = replace(result, reinserted=len(effects), unreal=unreal)
     return replace(result, note="; ".join(filter(None, (result.note, note))))
 
 
@@ -550,11 +550,11 @@ def summary(results: Sequence[PairResult]) -> str:
     """Return the counts of a part in a sentence."""
     words = {word: sum(each.word == word for each in results) for word in ("same", "different", "refused")}
     judged_ones = [each for each in results if each.engines is not None or each.mended is not None]
-    put_back = sum(each.put_back for each in results)
+    reinserted = sum(each.reinserted for each in results)
     return (
         f"{len(results)} pairs: {words['same']} the same robot, {words['different']} different, "
         f"{words['refused']} refused. Engines check {len(judged_ones)}. Pairs with a difference that engines "
-        f"see and dynx does not name: {sum(map(missed, results))}. Of {put_back} elements that were "
+        f"see and dynx does not name: {sum(map(missed, results))}. Of {reinserted} elements that were "
         f"reinserted alone, {sum(len(each.unreal) for each in results)} have no effect in Pinocchio."
     )
 
