@@ -385,7 +385,7 @@ def _with_constraints(draw: st.DrawFn, scene: Scene) -> Scene:
     if not free:
         return scene
     made: list[Weld | PointToPoint] = []
-    for a in draw(optional(st.lists(st.sampled_from(free), max_size=2, unique=True))) or []:
+    for a in draw(optional(st.lists(st.sampled_from(free), min_size=1, max_size=2, unique=True))) or []:
         b = draw(st.sampled_from([end for end in ends if end != a and end not in {c.a for c in made}]))
         if draw(st.booleans()):
             made.append(Weld(a, b))
