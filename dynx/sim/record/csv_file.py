@@ -5,14 +5,14 @@ The first line names the columns, in this order; ``c`` stands for each coordinat
 | columns | content | unit |
 |---|---|---|
 | `t` | time | s |
-| `q:c`, `v:c` | position, velocity | rad, m, per second |
-| `q*:c`, `v*:c`, `a*:c` | reference, if there is one | rad, m, per second, per second squared |
-| `error:c` | tracking error, if there is a reference | rad, m |
-| `energy` | kinetic and potential | J |
-| `a:c`, `tau:c` | acceleration and torque in the step that starts at this time | per second squared; N m, N |
+| `q:c`, `v:c` | position, velocity | rad or m; per s |
+| `q*:c`, `v*:c`, `a*:c` | reference, if any: position, velocity, acceleration | rad or m; per s; per s^2 |
+| `error:c` | tracking error, if there is a reference | rad or m |
+| `energy` | sum of kinetic and potential energy | J |
+| `a:c`, `tau:c` | acceleration and torque in the step that starts at this time | rad/s^2 or m/s^2; N m or N |
 | `saturated:c` | 1 if the motor was at its limit in that step, otherwise 0 | |
-| `contact:name:x`, `:y`, `:z` | sum of the contact forces on a body or link in that step, world axes | N |
-| `sensor:name:value` | sample of a sensor that was taken at this time, otherwise empty | |
+| `contact:name:x`, `:y`, `:z` | sum of the contact forces on a body or link in that step, in world axes | N |
+| `sensor:name:value` | sample of a sensor, if it took one at this time, otherwise empty | as in the sensor |
 
 Coordinates have the names of their joints. A floating base comes first: `x y z qx qy qz qw` in positions (of
 the base frame in the world, quaternion xyzw) and `vx vy vz wx wy wz` in rates (in the base frame). No step

@@ -3,12 +3,12 @@
 | topic | type | content |
 |---|---|---|
 | `/joint_states` | sensor_msgs/JointState | positions, velocities and efforts of the joints |
-| `/accelerations` | trajectory_msgs/JointTrajectory | one point that has `accelerations` |
+| `/accelerations` | trajectory_msgs/JointTrajectory | accelerations of the joints, in one point |
 | `/saturated` | sensor_msgs/JointState | `effort` is 1 if the motor was at its limit, otherwise 0 |
 | `/energy` | std_msgs/Float64 | kinetic and potential energy [J] |
 | `/reference` | sensor_msgs/JointState | reference positions and velocities |
-| `/reference_accelerations` | trajectory_msgs/JointTrajectory | one point that has `accelerations` |
-| `/error` | sensor_msgs/JointState | `position` is the reference minus the position |
+| `/reference_accelerations` | trajectory_msgs/JointTrajectory | reference accelerations, in one point |
+| `/error` | sensor_msgs/JointState | `position` is the tracking error: the reference minus the position |
 | `/robot_description` | std_msgs/String | the simulated robot as URDF, once, at the beginning |
 
 A floating base adds these topics. Its pose is in the frame ``world`` (``map`` if the root link is called
@@ -19,10 +19,10 @@ A floating base adds these topics. Its pose is in the frame ``world`` (``map`` i
 | `/tf` | tf2_msgs/TFMessage | the pose of the root link |
 | `/base/odometry` | nav_msgs/Odometry | pose and velocity; covariances are 0 |
 | `/base/acceleration` | geometry_msgs/AccelStamped | derivative of the velocity in `/base/odometry` |
-| `/base/wrench` | geometry_msgs/WrenchStamped | wrench of the controller on the base, which has no motor |
+| `/base/wrench` | geometry_msgs/WrenchStamped | wrench of the controller on the base, usually 0 |
 | `/base/reference` | nav_msgs/Odometry | reference pose and velocity |
 | `/base/reference_acceleration` | geometry_msgs/AccelStamped | reference acceleration |
-| `/base/error` | geometry_msgs/TwistStamped | the displacement [m, rad] from the base to the reference |
+| `/base/error` | geometry_msgs/TwistStamped | translation [m], rotation [rad] from base to reference |
 
 A rollout in a scene adds a topic for each body and link that touches something; characters that ROS does not
 allow in names become ``_``:
@@ -37,8 +37,8 @@ of their header is the time at which they were taken, and its frame is called li
 | topic | type | content |
 |---|---|---|
 | `/sensors/NAME` | sensor_msgs/Imu | the sample of an IMU, with the covariances of its white noise |
-| `/sensors/NAME` | geometry_msgs/WrenchStamped | force, and torque of a force-torque sensor |
-| `/sensors/NAME` | sensor_msgs/JointState | position and velocity, or effort, of the joint |
+| `/sensors/NAME` | geometry_msgs/WrenchStamped | wrench of a force-torque sensor; contact force |
+| `/sensors/NAME` | sensor_msgs/JointState | encoder: position, velocity; joint torque: effort |
 | `/sensors/NAME` | std_msgs/Float64 | distance of a ray sensor |
 
 Every number is the float64 of the record. The torque of a step is stamped with the time at which the step
