@@ -536,7 +536,11 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
         if link.inertial is not None and (link.inertial.mass or np.any(link.inertial.tensor)):
             own = link.inertial
             inertial = ET.SubElement(body, "inertial", mass=style.number(float(own.mass)))
-            if style.rotation in (0, 3) and np.any(own.tensor):
+            if not np.any(own.tensor):
+                # MuJoCo takes zeros as principal moments alone.
+                inertial.set("pos", _text(style, own.com))
+                inertial.set("diaginertia", _text(style, np.zeros(3)))
+            elif style.rotation in (0, 3):
                 values, vectors = np.linalg.eigh(own.tensor)
                 if np.linalg.det(vectors) < 0.0:
                     vectors[:, 0] *= -1.0

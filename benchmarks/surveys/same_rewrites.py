@@ -216,6 +216,10 @@ def split_links(it: Rewritten, rng: np.random.Generator, floating: bool) -> None
         d = rng.normal(size=3)
         d *= 0.3 * np.sqrt(least / own.mass) / np.linalg.norm(d)
         rest = own.tensor - shifted_tensor(own.mass * share * (1 - share), d)
+        moments = np.linalg.eigvalsh(rest)
+        if moments[2] > moments[0] + moments[1]:
+            # No body has such moments, and Drake replaces them.
+            d, rest = np.zeros(3), own.tensor
         T = pose(random_rotation(rng), rng.uniform(-0.2, 0.2, 3))
         second = Inertial(own.mass * (1 - share), own.com - share * d, (1 - share) * rest, own.frame)
         link.inertial = Inertial(own.mass * share, own.com + (1 - share) * d, share * rest, own.frame)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import PurePath
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -45,6 +45,10 @@ Kind = Literal[
     "gravity",
     "base pose",
 ]
+
+_ShapeKind = Literal["collision shapes", "visual shapes"]
+
+_SHAPE_KINDS: tuple[_ShapeKind, ...] = get_args(_ShapeKind)
 
 DIGITS = 12
 """Significant digits in which the sizes of shapes are written."""
@@ -138,44 +142,62 @@ def _of_links(ours: Model, theirs: Model, found: Fit, each: BodyFit, tolerance: 
             yield Attribute("name", "link", first, second, first, second, *lines)
             mine.pop(first)
             other.pop(second)
-    for a, b in _renamed_links(mine, other, found, each, tolerance):
+    shapes = {kind: _matched_shapes(kind, ours, theirs, found, each, tolerance) for kind in _SHAPE_KINDS}
+    placed = {
+        (first.number[0], second.number[0])
+        for pairs, _, _ in shapes.values()
+        for first, second in pairs
+        if first.number and second.number
+    }
+    for a, b in _renamed_links(mine, other, found, each, placed, tolerance):
         lines = ours.link(a).line, theirs.link(b).line
         yield Attribute("name", "link", a, b, a, b, *lines)
-    for kind in ("collision shapes", "visual shapes"):
-        yield from _of_shapes(kind, ours, theirs, found, each, tolerance)
+    for kind, (_, alone, left) in shapes.items():
+        yield from _of_shapes(kind, ours, theirs, found, each, alone, left)
 
 
 def _renamed_links(
-    mine: dict[str, int], other: dict[str, int], found: Fit, each: BodyFit, tolerance: float
+    mine: dict[str, int],
+    other: dict[str, int],
+    found: Fit,
+    each: BodyFit,
+    placed: set[tuple[str, str]],
+    tolerance: float,
 ) -> Iterator[tuple[str, str]]:
-    """Yield links with mass that only the names distinguish: those of a body whose inertias are equal."""
+    """Yield links that only the names distinguish: those of a body whose inertias are equal, or that have the
+    same shapes and no mass. `placed` has the names of links with shapes that are equal."""
     left = [name for name in other if name not in mine]
     for a in mine:
         if a in other or not left:
             continue
         inertia = found.ours.link_inertia(mine[a])
+        own = float_inertia(inertia)
         for b in left:
-            difference = subtract(inertia, transformed(found.theirs.link_inertia(other[b]), each.D))
-            own = float_inertia(inertia)
-            if (
-                own.mass > 0.0
-                and inertia_ratio(float_inertia(difference), own, found.ours.whole) <= tolerance
-            ):
+            theirs = found.theirs.link_inertia(other[b])
+            difference = float_inertia(subtract(inertia, transformed(theirs, each.D)))
+            if own.mass > 0.0:
+                equal = inertia_ratio(difference, own, found.ours.whole) <= tolerance
+            else:
+                equal = (a, b) in placed and not float(theirs.mass) > 0.0
+            if equal:
                 yield a, b
                 left.remove(b)
                 break
 
 
 def _of_shapes(
-    kind: Literal["collision shapes", "visual shapes"],
+    kind: _ShapeKind,
     ours: Model,
     theirs: Model,
     found: Fit,
     each: BodyFit,
-    tolerance: float,
+    alone: list[_ShapeOfBody],
+    left: list[_ShapeOfBody],
 ) -> Iterator[Attribute]:
-    """Compare the shapes of a body, wherever in its links they are; meshes by their names and scales."""
-    _, alone, left = _matched_shapes(kind, ours, theirs, found, each, tolerance)
+    """Compare the shapes of a body, wherever in its links they are; meshes by their names and scales.
+
+    `alone` has those that only the first description has, `left` those of the second one.
+    """
     unmatched = [shape.words for shape in alone]
     if unmatched or left:
         names = [
@@ -203,7 +225,7 @@ def _link_of_shapes(model: Model, numbers: list[int], shapes: list[_ShapeOfBody]
 
 
 def _matched_shapes(
-    kind: Literal["collision shapes", "visual shapes"],
+    kind: _ShapeKind,
     ours: Model,
     theirs: Model,
     found: Fit,

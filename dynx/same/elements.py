@@ -163,9 +163,13 @@ def _with_fixed_joints(
     tried: set[str] = {each.theirs for each in known}
     while len(best.elements) > len(known):
         trials: list[tuple[Analysis, DifferingElement, Model]] = []
+        # A base that itself differs may have a frame that was chosen for what is above the fixed joint.
+        at_root = (
+            best.fit.theirs.body_of[each.theirs] == ROOT for each in best.elements if each.tag == "link"
+        )
+        base = None if any(at_root) else rounded(best.fit.bodies[0].D)
         for each in islice(_fixed_joints(best, ours.model, tried), MAX_TRIALS):
             placed = apply(changed, each.changes)
-            base = rounded(best.fit.bodies[0].D)
             trials.append((_analysed(ours, placed, [*known, each], tolerance, base), each, placed))
         found = min(trials, key=lambda trial: trial[0].cost, default=None)
         if found is None or found[0].cost >= best.cost:
@@ -202,14 +206,31 @@ def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[
     model = found.theirs.model
     above = {joint.child: joint for joint in model.joints}
     below: dict[str, list[DifferingElement]] = {}
+    in_body: dict[int, list[DifferingElement]] = {}
+    misplaced = {each.theirs for each in analysis.elements if each.part == "origin"}
     for element in analysis.elements:
         if element.tag == "joint" and (element.part != "origin" or not model.joint(element.theirs).moves):
             continue
         link = element.theirs if element.tag == "link" else model.joint(element.theirs).parent
+        in_body.setdefault(found.theirs.body_of[link], []).append(element)
         while link in above and not above[link].moves:
             below.setdefault(above[link].name, []).append(element)
             link = above[link].parent
     mine = {name: joint for name, joint in _named_counterparts(ours, model).items() if not joint.moves}
+
+    def placed(joint: Joint, elements: list[DifferingElement], beside: bool) -> Iterator[DifferingElement]:
+        # The place of a joint says exactly where its parent is, whatever the frames of links.
+        joints, links = ([each for each in elements if each.tag == tag] for tag in ("joint", "link"))
+        for element in (*joints[:1], *links[:1]):
+            with fifty_digits():
+                displacements = [*_displacements(found, joint, element)]
+                if beside:
+                    displacements = [inverse(each) for each in displacements]
+            for displacement in displacements:
+                other = _placed(found, mine.get(joint.name), joint, displacement)
+                if other is not None:
+                    yield other
+
     for joint in [joint for joint in model.joints if joint.name in below and joint.name not in tried]:
         # What is written as in the other description is not at fault; what has no counterpart there may be
         # if several elements, or the place of a joint, depend on it.
@@ -221,15 +242,20 @@ def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[
         else:
             suspect = elements[0].tag == "joint" or len(elements) > 1
         if suspect:
-            # The place of a joint says exactly where its parent is, whatever the frames of links.
-            joints, links = ([each for each in elements if each.tag == tag] for tag in ("joint", "link"))
-            for element in (*joints[:1], *links[:1]):
-                with fifty_digits():
-                    displacements = [*_displacements(found, joint, element)]
-                for displacement in displacements:
-                    placed = _placed(found, mine.get(joint.name), joint, displacement)
-                    if placed is not None:
-                        yield placed
+            yield from placed(joint, elements, beside=False)
+    # The frame of a body may be chosen for what is below a fixed joint: all else in the body differs then.
+    for joint in model.joints:
+        if joint.moves or joint.name in below or joint.name in tried:
+            continue
+        body = found.theirs.body_of[joint.child]
+        elements = in_body.get(body, [])
+        count = len(elements) + (body != ROOT and found.theirs.joints[body].name in misplaced)
+        if (
+            elements
+            and count > 1
+            and not (joint.name in mine and are_alike(mine[joint.name].origin, joint.origin))
+        ):
+            yield from placed(joint, elements, beside=True)
 
 
 def _displacements(found: Fit, joint: Joint, element: DifferingElement) -> Iterator[Array]:

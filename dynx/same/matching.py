@@ -291,7 +291,8 @@ class Matching:
         plans = [self._children(a, b, D, self._by_name)]
         if plans[0].cost >= 2.0 or plans[0].missing:
             plans.append(self._children(a, b, D, self._by_place))
-        best = min(plans, key=lambda plan: plan.rank)
+        # What is written differently is a reason to choose an element, and none to match other joints.
+        best = min(plans, key=lambda plan: (round(plan.cost), plan.opposite))
         opposite = best.opposite + (a != ROOT and self._cosine(a, b, D) < 0.0)
         return replace(best, cost=own + best.cost, pairs=(BodyPair(a, b), *best.pairs), opposite=opposite)
 

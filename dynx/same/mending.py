@@ -13,6 +13,7 @@ import numpy as np
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, Pose
 from dynx.model.mjcf.expansion import read_document
+from dynx.model.mjcf.writer import inertial_attributes
 from dynx.model.xml.reading import Element
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.model.xml.text import quoteattr
@@ -225,13 +226,8 @@ class _Mjcf:
             raise NotMendedError(f"the inertia of body {link} follows from its geoms")
         if new is None:
             raise NotMendedError(f"body {link} cannot be without an inertia in MJCF")
-        R = new.origin.matrix[:3, :3]
-        tensor = R @ new.tensor @ R.T
-        rows = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-        text = (
-            f'<inertial pos="{numbers(new.origin.xyz)}" mass="{number(new.mass)}" '
-            f'fullinertia="{numbers(rows)}"/>'
-        )
+        written = " ".join(f'{name}="{value}"' for name, value in inertial_attributes(new).items())
+        text = f"<inertial {written}/>"
         body = self._body(link)
         present = body.first("inertial")
         if present is not None:

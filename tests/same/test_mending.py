@@ -118,6 +118,19 @@ def test_one_element_of_mjcf_is_mended(old: str, new: str, element: tuple[str, s
     assert same_robot(ARM, report.mended_text).same
 
 
+def test_a_point_mass_of_mjcf_is_mended_as_mujoco_takes_it() -> None:
+    """MuJoCo refuses zeros as a tensor, and takes them as principal moments."""
+    mujoco = pytest.importorskip("mujoco")
+    tip = '<body name="tip" pos="0.1 0 0"><inertial pos="{} 0 0" mass="0.1" diaginertia="0 0 0"/></body>'
+    joint = '<joint name="elbow" axis="0 0 1" range="-1 1"/>'
+    first, second = (BODIES.replace(joint, joint + tip.format(x)) for x in (0.0, 0.1))
+    report = same_robot(first, second)
+    assert [(each.part, each.theirs) for each in report.differences] == [("inertial", "tip")]
+    assert report.mended_text is not None
+    assert same_robot(first, report.mended_text).same
+    assert mujoco.MjModel.from_xml_string(report.mended_text.decode()).nv == 2
+
+
 def test_urdf_and_mjcf_of_one_robot_are_the_same() -> None:
     report = same_robot(ARM, BODIES)
     assert report.same

@@ -144,6 +144,27 @@ def test_a_misplaced_fixed_joint_is_one_element_where_frames_are_moved(
     assert same_robot(model, report.mended).same
 
 
+@settings(QUICK, max_examples=3)
+@given(SEEDS, SIZES, st.booleans())
+def test_a_fixed_joint_moved_along_the_axis_of_its_body_is_one_element_where_frames_are_moved(
+    seed: int, size: float, floating: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    model = random_tree(rng, floating)
+    turning = {each.child: each for each in model.joints if each.type == "revolute"}
+    # A slide says nothing of places.
+    carrying = {joint.parent for joint in turning.values()}
+    joint = picked(
+        model, rng, lambda each: not each.moves and each.parent in turning and each.child in carrying
+    )
+    # The axis of the body stays where it is, whichever side of the joint is taken to be misplaced.
+    other = with_joint(model, moved(joint, size * np.array(turning[joint.parent].axis)))
+    report = same_robot(model, with_moved_frames(other, rng))
+    assert [part for part, *_ in names(report)] == ["origin"]
+    assert report.mended is not None
+    assert same_robot(model, report.mended).same
+
+
 @QUICK
 @given(SEEDS, SIZES, st.booleans())
 def test_a_joint_moved_along_its_axis_is_one_element_for_all_links_that_it_carries(
@@ -225,3 +246,28 @@ def test_a_misplaced_joint_of_a_base_of_two_links_is_named_where_frames_are_move
     other = rebuilt(robot, robot.links, [placed if each is joint else each for each in robot.joints])
     report = same_robot(robot, with_moved_frames(other, np.random.default_rng(seed)))
     assert [(each.theirs, each.part) for each in report.differences] == [(joint.name, "origin")]
+
+
+@pytest.mark.parametrize("angle", [1e-7, 5e-6, 1e-3])
+def test_wheels_on_one_line_are_matched_by_name_below_a_misplaced_joint(angle: float) -> None:
+    """Each of the two would do for the other, and then fewer joints are written as their counterparts."""
+    tensor = np.diag([0.02, 0.04, 0.02])
+    links = [Link("ground"), Link("base", inertial_of(5.0, Pose((0.1, 0.0, 0.2)), 10.0 * tensor))]
+    joints = [Joint("to_base", "fixed", "ground", "base", Pose((0.0, 0.0, 0.1)))]
+    for name, place, axis in (
+        ("left", (0.0, 0.2, 0.0), (0.0, 1.0, 0.0)),
+        ("right", (0.0, -0.2, 0.0), (0.0, 1.0, 0.0)),
+        ("lift", (0.1, 0.0, 0.5), (0.0, 0.0, 1.0)),
+    ):
+        links.append(Link(name, inertial_of(1.0, Pose(), tensor)))
+        kind: JointType = "prismatic" if name == "lift" else "revolute"
+        joints.append(
+            Joint(f"{name}_joint", kind, "base", name, Pose(place), axis, Limits(-1.0, 1.0, 1.0, 1.0))
+        )
+    links.append(Link("arm", inertial_of(1.0, Pose((0.1, 0.2, 0.3)), tensor)))
+    joints.append(Joint("arm_joint", "revolute", "lift", "arm", Pose(), (1.0, 0.0, 0.0), joints[-1].limits))
+    robot = Model.build("wheels", links, joints)
+    other = with_joint(robot, replace(joints[0], origin=Pose((0.0, 0.0, 0.1), (angle, 0.0, 0.0))))
+    report = same_robot(robot, other, tolerance=1e-10)
+    assert names(report) == [("origin", "to_base", "to_base")]
+    assert report.attributes == ()

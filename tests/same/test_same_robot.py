@@ -389,6 +389,21 @@ def test_another_name_of_a_link_that_a_fixed_joint_holds_is_listed() -> None:
     ]
 
 
+@pytest.mark.parametrize("name", ["rail", "camera"])
+def test_another_name_of_a_link_without_mass_is_listed_where_it_has_shapes(name: str) -> None:
+    text = """<robot name="r">
+        <link name="rail"><visual><geometry><box size="1 0.1 0.1"/></geometry></visual></link>
+        <link name="cart"><inertial><mass value="1"/>
+        <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+        <link name="camera"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>
+        <joint name="slide" type="prismatic"><parent link="rail"/><child link="cart"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+        <joint name="held" type="fixed"><parent link="cart"/><child link="camera"/></joint></robot>"""
+    report = same_robot(text, text.replace(f'"{name}"', '"other"'))
+    assert report.same
+    assert [(each.kind, each.ours, each.theirs) for each in report.attributes] == [("name", name, "other")]
+
+
 @pytest.mark.parametrize("size", [1e-9, 1e-6, 0.1])
 def test_sizes_and_places_of_shapes_are_compared_to_the_tolerance(size: float) -> None:
     text = """<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/>

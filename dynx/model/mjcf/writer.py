@@ -196,7 +196,7 @@ class RobotWriter:
             bodies[link.name] = body
             self._body_names[link.name] = WORLD if body is world else body.attrib["name"]
             if body is not world and link.inertial is not None:
-                SubElement(body, "inertial", _inertial_attributes(link.inertial))
+                SubElement(body, "inertial", inertial_attributes(link.inertial))
             self._add_shapes(body, link)
             for frame in frames.get(link.name, ()):
                 name = _checked_name(frame.name)
@@ -538,7 +538,7 @@ def _pose_attributes(pose: Pose) -> dict[str, str]:
     return {name: value for name, value in given.items() if value != absent[name]}
 
 
-def _inertial_attributes(inertial: Inertial) -> dict[str, str]:
+def inertial_attributes(inertial: Inertial) -> dict[str, str]:
     """Return mass, centre and moments: principal ones with their axes, else the tensor in the link's axes."""
     T = inertial.origin.matrix
     tensor, R = inertial.tensor, T[:3, :3]
