@@ -5,25 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import PurePath
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 from dynx.errors import DescriptionError
 from dynx.model import Model
 from dynx.model.elements import Joint, Link
-from dynx.model.geometry.links import Collision, ShapeNumber, Visual
-from dynx.model.geometry.mesh import Mesh
+from dynx.model.geometry.links import ShapeNumber
 from dynx.model.mechanism import ROOT
-from dynx.model.numbers import is_real
 from dynx.same.decimals import rounded
-from dynx.same.elements import pose_text, vector_text
 from dynx.same.fit import BodyFit, Fit, angle_of
 from dynx.same.limits import differs, limit_differences
 from dynx.same.scales import inertia_ratio
+from dynx.same.shapes import NEGLIGIBLE, SHAPE_KINDS, MatchedShapes, ShapeKind, ShapeOfBody, matched_shapes
 from dynx.same.skeleton import float_inertia, subtract, transformed
-from dynx.spatial.scalar import Floats
+from dynx.same.text import pose_text, vector_text
 from dynx.spatial.se3 import homogeneous, inverse
 
 Kind = Literal[
@@ -45,16 +42,6 @@ Kind = Literal[
     "gravity",
     "base pose",
 ]
-
-_ShapeKind = Literal["collision shapes", "visual shapes"]
-
-_SHAPE_KINDS: tuple[_ShapeKind, ...] = get_args(_ShapeKind)
-
-DIGITS = 12
-"""Significant digits in which the sizes of shapes are written."""
-
-NEGLIGIBLE = 1e-12
-"""Distance [m] or angle [rad] below which two frames are the same."""
 
 
 @dataclass(frozen=True)
@@ -142,18 +129,21 @@ def _of_links(ours: Model, theirs: Model, found: Fit, each: BodyFit, tolerance: 
             yield Attribute("name", "link", first, second, first, second, *lines)
             mine.pop(first)
             other.pop(second)
-    shapes = {kind: _matched_shapes(kind, ours, theirs, found, each, tolerance) for kind in _SHAPE_KINDS}
+    shapes = {
+        kind: matched_shapes(kind, found.ours, found.theirs, each.ours, each.theirs, each.D, tolerance)
+        for kind in SHAPE_KINDS
+    }
     placed = {
         (first.number[0], second.number[0])
-        for pairs, _, _ in shapes.values()
-        for first, second in pairs
+        for matched in shapes.values()
+        for first, second in matched.pairs
         if first.number and second.number
     }
     for a, b in _renamed_links(mine, other, found, each, placed, tolerance):
         lines = ours.link(a).line, theirs.link(b).line
         yield Attribute("name", "link", a, b, a, b, *lines)
-    for kind, (_, alone, left) in shapes.items():
-        yield from _of_shapes(kind, ours, theirs, found, each, alone, left)
+    for kind, matched in shapes.items():
+        yield from _of_shapes(kind, matched, found, each)
 
 
 def _renamed_links(
@@ -185,30 +175,20 @@ def _renamed_links(
                 break
 
 
-def _of_shapes(
-    kind: _ShapeKind,
-    ours: Model,
-    theirs: Model,
-    found: Fit,
-    each: BodyFit,
-    alone: list[_ShapeOfBody],
-    left: list[_ShapeOfBody],
-) -> Iterator[Attribute]:
-    """Compare the shapes of a body, wherever in its links they are; meshes by their names and scales.
-
-    `alone` has those that only the first description has, `left` those of the second one.
-    """
-    unmatched = [shape.words for shape in alone]
-    if unmatched or left:
+def _of_shapes(kind: ShapeKind, matched: MatchedShapes, found: Fit, each: BodyFit) -> Iterator[Attribute]:
+    """Yield the difference of the shapes of a body, if there is one; meshes differ by their names and
+    scales."""
+    alone, left = matched.first, matched.second
+    if alone or left:
         names = [
-            _link_of_shapes(model, numbers, [*own, *others])
-            for model, numbers, own, others in (
-                (ours, found.ours.links[each.ours], alone, left),
-                (theirs, found.theirs.links[each.theirs], left, alone),
+            _link_of_shapes(skeleton.model, skeleton.links[body], [*own, *others])
+            for skeleton, body, own, others in (
+                (found.ours, each.ours, alone, left),
+                (found.theirs, each.theirs, left, alone),
             )
         ]
         first, second = (
-            ", ".join(sorted(words)) or "none" for words in (unmatched, [shape.words for shape in left])
+            ", ".join(sorted(shape.words for shape in shapes)) or "none" for shapes in (alone, left)
         )
         if first == second:
             second = f"placed otherwise: {second}"
@@ -216,7 +196,7 @@ def _of_shapes(
         yield Attribute(kind, "link", names[0].name, names[1].name, first, second, *lines)
 
 
-def _link_of_shapes(model: Model, numbers: list[int], shapes: list[_ShapeOfBody]) -> Link:
+def _link_of_shapes(model: Model, numbers: list[int], shapes: list[ShapeOfBody]) -> Link:
     """Return the link of a body that has the first of some shapes, or the name of the link that has it in the
     other description; the first link of the body if it has neither."""
     links = {model.links[number].name: model.links[number] for number in numbers}
@@ -224,107 +204,15 @@ def _link_of_shapes(model: Model, numbers: list[int], shapes: list[_ShapeOfBody]
     return next((links[name] for name in named if name in links), model.links[numbers[0]])
 
 
-def _matched_shapes(
-    kind: _ShapeKind,
-    ours: Model,
-    theirs: Model,
-    found: Fit,
-    each: BodyFit,
-    tolerance: float,
-) -> tuple[list[tuple[_ShapeOfBody, _ShapeOfBody]], list[_ShapeOfBody], list[_ShapeOfBody]]:
-    """Return the equal shapes of a body, those that only the first one has, and those of the second one."""
-    mine = _shapes(kind, ours, found.ours.links[each.ours], found, None)
-    left = _shapes(kind, theirs, found.theirs.links[each.theirs], found, each)
-    limit = max(tolerance, NEGLIGIBLE)
-    pairs, alone = [], []
-    for shape in mine:
-        same = next((other for other in left if shape.equals(other, limit, found.ours.reach)), None)
-        if same is None:
-            alone.append(shape)
-        else:
-            pairs.append((shape, same))
-            left = [other for other in left if other is not same]
-    return pairs, alone, left
-
-
-def collision_pairs(
-    ours: Model, theirs: Model, found: Fit, tolerance: float
-) -> Iterator[tuple[ShapeNumber, ShapeNumber]]:
+def collision_pairs(found: Fit, tolerance: float) -> Iterator[tuple[ShapeNumber, ShapeNumber]]:
     """Yield the collision shapes that are equal in both robots, wherever in the links of a body they are."""
     for each in found.bodies:
-        pairs, _, _ = _matched_shapes("collision shapes", ours, theirs, found, each, tolerance)
-        yield from ((mine.number, other.number) for mine, other in pairs if mine.number and other.number)
-
-
-@dataclass(frozen=True)
-class _ShapeOfBody:
-    """A shape with its pose T (4, 4) in the frame of our body: what is equal or not, and what is as large;
-    `number` is its own, None for a fault."""
-
-    number: ShapeNumber | None
-    kind: tuple[object, ...]
-    sizes: Floats
-    T: Floats
-    words: str
-
-    def equals(self, other: _ShapeOfBody, tolerance: float, length: float) -> bool:
-        """Check whether two shapes differ by at most `tolerance` of their sizes, of `length` and of 1 rad."""
-        if self.kind != other.kind or self.sizes.shape != other.sizes.shape:
-            return False
-        if np.any(np.abs(self.sizes - other.sizes) > tolerance * np.abs(self.sizes)):
-            return False
-        apart = np.abs(self.T - other.T)[:3]
-        return bool(np.max(apart[:, :3]) <= tolerance and np.max(apart[:, 3]) <= tolerance * length)
-
-
-def _shapes(
-    kind: str, model: Model, links: list[int], found: Fit, each: BodyFit | None
-) -> list[_ShapeOfBody]:
-    """Return the shapes of some links with their poses in the frame of our body."""
-    shapes = []
-    skeleton = found.ours if each is None else found.theirs
-    for number in links:
-        name = model.links[number].name
-        try:
-            placed: tuple[Visual | Collision, ...] = (
-                model.geometry.collisions(name)
-                if kind == "collision shapes"
-                else model.geometry.visuals(name)
-            )
-        except DescriptionError as error:
-            words = f"a fault ({error.message})"
-            shapes.append(_ShapeOfBody(None, (words,), np.zeros(0), np.eye(4), words))
-            continue
-        if not placed:
-            continue
-        T = rounded(skeleton.link_pose(number))
-        if each is not None:
-            T = rounded(each.D) @ T
-        shapes += [
-            _shape_of_body((name, k), shape, T @ shape.origin.matrix) for k, shape in enumerate(placed)
-        ]
-    return shapes
-
-
-def _shape_of_body(own: ShapeNumber, placed: Visual | Collision, T: Floats) -> _ShapeOfBody:
-    """Take a shape apart; a mesh is its file's name and its scale."""
-    shape = placed.shape
-    if isinstance(shape, Mesh):
-        scale = "" if shape.scale == (1.0, 1.0, 1.0) else f" scaled by {vector_text(shape.scale, DIGITS)}"
-        name = PurePath(shape.name).name
-        return _ShapeOfBody(own, ("mesh", name), np.array(shape.scale), T, f"mesh {name}{scale}")
-    kind: list[object] = [type(shape).__name__.lower()]
-    sizes: list[float] = []
-    words = []
-    for name, value in vars(shape).items():
-        numbers = value if isinstance(value, tuple) else (value,)
-        if len(numbers) > 3 or not all(is_real(number) for number in numbers):
-            kind += [name, value]
-            continue
-        sizes += [float(number) for number in numbers]
-        words.append(f"{name} {vector_text(map(float, numbers), DIGITS)}")
-    text = " ".join([str(kind[0]), ", ".join(words)]).strip()
-    return _ShapeOfBody(own, tuple(kind), np.array(sizes), T, text)
+        matched = matched_shapes(
+            "collision shapes", found.ours, found.theirs, each.ours, each.theirs, each.D, tolerance
+        )
+        for mine, other in matched.pairs:
+            if mine.number and other.number:
+                yield mine.number, other.number
 
 
 def frame_differences(

@@ -31,14 +31,12 @@ from dynx.same.elements import (
     analyse,
     apply,
     are_equal,
-    inertial_text,
-    pose_text,
-    vector_text,
 )
 from dynx.same.fit import Fit
 from dynx.same.mending import NotMendedError, mended_text
 from dynx.same.report import Coordinate, ElementDifference, SameReport, Unmatched
 from dynx.same.skeleton import Skeleton, exact_skeleton, without_standing_mimics
+from dynx.same.text import inertial_text, pose_text, vector_text
 
 Robot = StrPath | bytes | bytearray | Model
 

@@ -18,10 +18,10 @@ from dynx.same.attributes import (
     listed,
     number_text,
 )
-from dynx.same.elements import vector_text
 from dynx.same.fit import BodyFit, Fit
 from dynx.same.limits import differs
 from dynx.same.skeleton import Skeleton
+from dynx.same.text import vector_text
 
 MAX_PAIRS = 250_000
 """Largest number of pairs of shapes for which the links are listed that other bits let touch."""
@@ -97,7 +97,7 @@ def contact_differences(
             return
     if not mine.stated.enabled:
         return
-    pairs = [_ShapePair(*each) for each in collision_pairs(ours, theirs, found, tolerance)]
+    pairs = [_ShapePair(*each) for each in collision_pairs(found, tolerance)]
     other_bits = {
         each for each in pairs if mine.stated.bits_of(each.ours) != other.stated.bits_of(each.theirs)
     }

@@ -24,6 +24,7 @@ from dynx.same.observability import observability_of
 from dynx.same.registration import principal_frames
 from dynx.same.scales import inertia_ratio
 from dynx.same.skeleton import Skeleton, are_alike, float_inertia, subtract, transformed
+from dynx.same.text import inertial_text, pose_text, vector_text
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous, inverse
@@ -37,9 +38,6 @@ PARTS = {part: part for part in get_args(Part)} | {"type": ""}
 
 SNAP = 1e-13
 """Difference [m, rad] below which a computed pose or axis is taken to be that of the other description."""
-
-ROUNDING = 1e-15
-"""Share of the largest number of a vector below which another one is rounding, and written as 0."""
 
 NOTHING = 1e-4
 """Share of the tolerance below which what is seen of a difference is rounding."""
@@ -808,26 +806,6 @@ def nearest_pose(T: Array, own: Pose) -> Pose:
     if float(np.max(np.abs(matrix - own.matrix))) < SNAP:
         return own
     return Pose.from_matrix(matrix)
-
-
-def vector_text(vector: Iterable[float], digits: int = 12) -> str:
-    """Write numbers as an attribute has them; those that are rounding beside the largest are 0."""
-    numbers = list(vector)
-    rounding = ROUNDING * max(map(abs, numbers), default=0.0)
-    return " ".join(f"{0.0 if abs(x) < rounding else x + 0.0:.{digits}g}" for x in numbers)
-
-
-def pose_text(pose: Pose) -> str:
-    """Write a pose as position and angles."""
-    return f"xyz {vector_text(pose.xyz)}, rpy {vector_text(pose.rpy)}"
-
-
-def inertial_text(inertial: Inertial | None) -> str:
-    """Write an inertial in one line."""
-    if inertial is None:
-        return "none"
-    moments = (inertial.ixx, inertial.iyy, inertial.izz, inertial.ixy, inertial.ixz, inertial.iyz)
-    return f"{inertial.mass:.12g} kg at {vector_text(inertial.origin.xyz)}, moments {vector_text(moments)}"
 
 
 def _names_text(names: list[str]) -> str:

@@ -21,6 +21,7 @@ from dynx.rbd.base_parameters import rotation_to_axis, split_inertia
 from dynx.same.limits import limit_differences
 from dynx.same.registration import candidates
 from dynx.same.scales import extent, inertia_ratio
+from dynx.same.shapes import SHAPE_KINDS, matched_shapes
 from dynx.same.skeleton import Skeleton, are_alike, subtract, transformed
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
@@ -148,10 +149,23 @@ class Matching:
         if found[0][0] == 0.0 or found[0][1] == 0:
             found = found[:1]
         best = self._chosen(ROOT, ROOT, found[0][2], 0.0)
+        # Of bases that explain as much, the one in which more shapes are where they were.
+        shapes = self._misplaced_shapes(found[0][2]) if len(found) > 1 else 0
         for _, _, D in found[1:]:
-            if (round(self._bound(ROOT, ROOT, D), 6), 0) < best.rank:
-                best = min(best, self._chosen(ROOT, ROOT, D, 0.0), key=lambda plan: plan.rank)
+            bound = round(self._bound(ROOT, ROOT, D), 6), 0
+            if bound < best.rank or (bound == best.rank and shapes):
+                plan, other = self._chosen(ROOT, ROOT, D, 0.0), self._misplaced_shapes(D)
+                if (plan.rank, other) < (best.rank, shapes):
+                    best, shapes = plan, other
         return best
+
+    def _misplaced_shapes(self, D: Floats) -> int:
+        """Count the shapes of floating bases with the frames D that have no equal."""
+        found = [
+            matched_shapes(kind, self.ours, self.theirs, ROOT, ROOT, D, self.tolerance)
+            for kind in SHAPE_KINDS
+        ]
+        return sum(len(each.first) + len(each.second) for each in found)
 
     def _bound(self, a: int, b: int, D: Floats) -> float:
         """Return a lower bound on the cost of two bodies with the frames D: a child that fits none of the

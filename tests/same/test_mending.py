@@ -11,7 +11,7 @@ import dynx
 from dynx.model.elements import Inertial, Joint, Link, Pose
 from dynx.model.library import find
 from dynx.same import same_robot
-from dynx.same.elements import vector_text
+from dynx.same.text import vector_text
 
 ARM = """<?xml version="1.0"?>
 <!-- an arm -->

@@ -271,3 +271,33 @@ def test_wheels_on_one_line_are_matched_by_name_below_a_misplaced_joint(angle: f
     report = same_robot(robot, other, tolerance=1e-10)
     assert names(report) == [("origin", "to_base", "to_base")]
     assert report.attributes == ()
+
+
+def pendulum_text(T: np.ndarray, shift: float) -> str:
+    """Return a pendulum on a floating base with its frame moved by T (4, 4), and the joint by `shift`."""
+    back = inverse(T)
+
+    def origin(x: float, y: float, z: float, frame: np.ndarray = back) -> str:
+        given = Pose.from_matrix(frame @ homogeneous(np.eye(3), np.array([x, y, z])))
+        xyz, rpy = (" ".join(map(repr, each)) for each in (given.xyz, given.rpy))
+        return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
+
+    inertia = (
+        '<mass value="2"/><inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0.001" ixz="0.002" iyz="0.003"/>'
+    )
+    return f"""<robot name="pendulum">
+        <link name="base"><inertial>{origin(0.05, 0.02, 0.01)}{inertia}</inertial>
+        <collision>{origin(0.1, 0.0, 0.0)}<geometry><box size="0.3 0.2 0.1"/></geometry></collision></link>
+        <link name="bar"><inertial>{origin(0.01, 0.0, 0.2, np.eye(4))}{inertia}</inertial></link>
+        <joint name="pivot" type="continuous"><parent link="base"/><child link="bar"/>
+        {origin(0.3, 0.0, 0.1 + shift)}<axis xyz="0 1 0"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("shift", [1e-6, 1e-3])
+def test_the_joint_is_misplaced_and_not_the_inertia_where_the_shapes_say_so(shift: float) -> None:
+    """Without the shape, the base may as well have another centre of mass and another frame."""
+    T = homogeneous(random_rotation(np.random.default_rng(1)), np.array([0.1, -0.2, 0.3]))
+    texts = pendulum_text(np.eye(4), 0.0), pendulum_text(T, shift)
+    report = same_robot(*texts, base="floating")
+    assert names(report) == [("origin", "pivot", "pivot")]
+    assert report.attributes == ()
