@@ -205,7 +205,6 @@ def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[
     above = {joint.child: joint for joint in model.joints}
     below: dict[str, list[DifferingElement]] = {}
     in_body: dict[int, list[DifferingElement]] = {}
-    misplaced = {each.theirs for each in analysis.elements if each.part == "origin"}
     for element in analysis.elements:
         if element.tag == "joint" and (element.part != "origin" or not model.joint(element.theirs).moves):
             continue
@@ -241,18 +240,15 @@ def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[
             suspect = elements[0].tag == "joint" or len(elements) > 1
         if suspect:
             yield from placed(joint, elements, beside=False)
-    # The frame of a body may be chosen for what is below a fixed joint: all else in the body differs then.
+    # The frame of a body may be chosen for what is below a fixed joint: all else in the body differs then, as
+    # may its own joint, or a floating base.
+    if sum(each.theirs not in tried for each in analysis.elements) < 2:
+        return
     for joint in model.joints:
         if joint.moves or joint.name in below or joint.name in tried:
             continue
-        body = found.theirs.body_of[joint.child]
-        elements = in_body.get(body, [])
-        count = len(elements) + (body != ROOT and found.theirs.joints[body].name in misplaced)
-        if (
-            elements
-            and count > 1
-            and not (joint.name in mine and are_alike(mine[joint.name].origin, joint.origin))
-        ):
+        elements = in_body.get(found.theirs.body_of[joint.child], [])
+        if elements and not (joint.name in mine and are_alike(mine[joint.name].origin, joint.origin)):
             yield from placed(joint, elements, beside=True)
 
 
