@@ -45,21 +45,21 @@ SETTINGS: Mapping[str, Setting] = {
     ),
     "contact_model": Setting(
         "hydroelastic",
-        "pressure over the surface of contact, or one point",
+        "'hydroelastic': pressure over the surface of contact; 'point': force at one point",
         choices=("hydroelastic", "point"),
     ),
     "modulus": Setting(3e6, "hydroelastic modulus of shapes that move [Pa]", 1e-3, needs=_HYDROELASTIC),
     "resolution": Setting(
         0.1,
-        "length of the edges by which cylinders are approximated, relative to the radius",
+        "length of the edges of the mesh that approximates a cylinder, relative to its radius",
         0.02,
         2.0,
         needs=_HYDROELASTIC,
     ),
-    "stiffness": Setting(1e6, "stiffness of every shape in contact at a point [N/m]", 1e-3),
+    "stiffness": Setting(1e6, "stiffness of every shape in point contact [N/m]", 1e-3),
     "relaxation_time": Setting(
         0.01,
-        "dissipation of contacts under 'sap': time of relaxation [s]",
+        "relaxation time of contacts under 'sap', which sets their dissipation [s]",
         needs=("contact_approximation", ("sap",)),
     ),
     "dissipation": Setting(

@@ -121,11 +121,13 @@ SETTINGS = {
     "erp": Setting(0.2, "share of the error of constraints and joint limits removed in a step", most=1.0),
     "contact_erp": Setting(0.05, "share of a penetration removed in a step", most=1.0),
     "friction_anchors": Setting(
-        False, "whether sticking contacts are drawn back to where they formed; this slows rolling bodies, too"
+                False,
+        "whether sticking contacts are pulled back to the point where they formed; this also slows rolling "
+        "bodies",
     ),
     "friction_erp": Setting(
         0.2,
-        "share of the drift of a sticking contact removed in a step, with `friction_anchors`",
+                "with `friction_anchors`: share of the drift of a sticking contact removed in a step",
         most=1.0,
         needs=("friction_anchors", (True,)),
     ),
@@ -143,7 +145,7 @@ SETTINGS = {
         1e6, "largest force [N] or moment [N m] of welds and point-to-point constraints", most=1e12
     ),
     "link_damping": Setting(
-        0.0, "damping [1/s] of the motion of every link and body, which Bullet by itself sets to 0.04"
+        0.0, "damping [1/s] of the motion of every link and body; Bullet's own default is 0.04"
     ),
     "strict_materials": STRICT_MATERIALS,
 }
