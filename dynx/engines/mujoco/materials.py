@@ -38,17 +38,23 @@ SETTINGS: Mapping[str, Setting] = {
     "solver": Setting("newton", "constraint solver", choices=("newton", "cg", "pgs")),
     "iterations": Setting(100, "largest number of iterations of the solver", 1),
     "tolerance": Setting(1e-10, "tolerance at which the solver stops", 0.0),
-    "cone": Setting("elliptic", "shape of the friction cone: 'elliptic' or 'pyramidal'", choices=("elliptic", "pyramidal")),
+    "cone": Setting(
+        "elliptic",
+        "shape of the friction cone: 'elliptic' or 'pyramidal'",
+        choices=("elliptic", "pyramidal"),
+    ),
     "impratio": Setting(100.0, "ratio of the impedances of friction and normal force", 1e-6),
     "noslip_iterations": Setting(0, "iterations of the solver that removes slip", 0),
     "ccd_iterations": Setting(50, "largest number of iterations of convex collision detection", 1),
     "time_constant": Setting(
-        0.005, "time constant of contacts and joint limits [s], at least two steps; a smaller value is stiffer", 1e-6
+        0.005,
+        "time constant of contacts and joint limits [s], at least two steps; a smaller value is stiffer",
+        1e-6,
     ),
     "slip_time_constant": Setting(
         0.01,
-                "time constant at which slip decays in contacts that stick [s], at least one step; with a small "
-        "value, sliding bodies may hop",
+        "time constant at which slip decays in contacts that stick [s], at least one step; with a "
+        "small value, sliding bodies may hop",
         1e-6,
     ),
     "impedance": Setting(

@@ -121,13 +121,13 @@ SETTINGS = {
     "erp": Setting(0.2, "share of the error of constraints and joint limits removed in a step", most=1.0),
     "contact_erp": Setting(0.05, "share of a penetration removed in a step", most=1.0),
     "friction_anchors": Setting(
-                False,
+        False,
         "whether sticking contacts are pulled back to the point where they formed; this also slows rolling "
         "bodies",
     ),
     "friction_erp": Setting(
         0.2,
-                "with `friction_anchors`: share of the drift of a sticking contact removed in a step",
+        "with `friction_anchors`: share of the drift of a sticking contact removed in a step",
         most=1.0,
         needs=("friction_anchors", (True,)),
     ),
