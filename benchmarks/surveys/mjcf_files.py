@@ -27,6 +27,7 @@ from benchmarks.surveys.format_files import FormatFiles, Outcome, is_odd, run
 from dynx.engines.silence import silence
 from dynx.errors import DynxError
 from tests.model.mjcf.models import compute
+from tests.world.scene.mjcf_scenes import differences as scene_differences
 
 EXACT = 1e-12
 """Largest difference from MuJoCo, relative to the largest entry."""
@@ -72,7 +73,7 @@ def examine(path: str) -> Outcome:
         if compiled is None or compiled.nv == 0:
             return Outcome(path, "refused, and no robot in MuJoCo", str(error))
         if "read_scene" in str(error):
-            return _scene(path, str(error))
+            return _scene(path, str(error), compiled)
         return Outcome(path, "refused", str(error))
     if compiled is None:
         return Outcome(path, "read, not by MuJoCo", message)
@@ -86,14 +87,22 @@ def examine(path: str) -> Outcome:
     return Outcome(path, "different", quantity, difference)
 
 
-def _scene(path: str, reason: str) -> Outcome:
+def _scene(path: str, reason: str, compiled: Any) -> Outcome:
+    """Read several robots as a scene, and compare it at its start and at a random state."""
+    import mujoco
+
     from dynx.world import read_scene
 
     try:
         scene = read_scene(path)
     except DynxError as error:
         return Outcome(path, "refused", f"{reason}; as a scene: {error}")
-    return Outcome(path, "read as a scene", f"{len(scene.robots)} robots, {len(scene.bodies)} bodies")
+    differences = scene_differences(mujoco, compiled, scene)
+    worst = max(differences, key=differences.__getitem__)
+    if differences[worst] <= (SINGLE if compiled.nmesh else EXACT):
+        words = f"{len(scene.robots)} robots, {len(scene.bodies)} bodies, {worst}"
+        return Outcome(path, "alike as a scene", words, differences[worst])
+    return Outcome(path, "different", f"as a scene: {worst}", differences[worst])
 
 
 def compare(model: dynx.Model, compiled: Any) -> tuple[float, str]:

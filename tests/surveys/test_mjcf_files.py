@@ -32,7 +32,7 @@ def test_other_ends_have_words_of_their_own(tmp_path: Path) -> None:
     path = tmp_path / "a.xml"
     free = BODY.format("freejoint")
     assert word_of(path, free, 'alignfree="true"') == "read, not compared"
-    assert word_of(path, free + free.replace('"tip"', '"top"')) == "read as a scene"
+    assert word_of(path, free + free.replace('"tip"', '"top"')) == "alike as a scene"
     ball = '<body><joint type="ball"/><geom size="1"/></body>'
     assert word_of(path, BODY.format('joint type="ball"')) == "alike"
     assert word_of(path, free + ball) == "refused"
