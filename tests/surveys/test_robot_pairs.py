@@ -77,7 +77,12 @@ def test_engines_judge_a_report(tmp_path: Path, part: str) -> None:
     if part == "same":
         assert (result.word, result.engines < 1e-9) == ("same", True)
         return
-    assert (result.word, result.engines > 1e-3, result.put_back, result.unreal) == ("different", True, 1, ())
+    assert (result.word, result.engines > 1e-3, result.reinserted, result.unreal) == (
+        "different",
+        True,
+        1,
+        (),
+    )
     assert result.mended is not None
     assert result.mended < 1e-9
 
