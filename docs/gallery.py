@@ -72,7 +72,7 @@ def humanoid(path: str) -> None:
         viewer.export(path, size=SIZE, direction=(1.0, -0.55, 0.25))
 
 
-@picture("Quadruped on a height field", "Motors hold a Unitree A1 in its stance on hills.")
+@picture("Quadruped on a height field", "Motors hold a Unitree A1 in its standing posture on hills.")
 def quadruped(path: str) -> None:
     x, y = np.meshgrid(np.linspace(-2.0, 2.0, 81), np.linspace(-2.0, 2.0, 81))
     steep = 0.035 + 0.1 * np.clip(np.hypot(x, y) - 0.35, 0.0, 1.0)
@@ -90,7 +90,7 @@ def quadruped(path: str) -> None:
             viewer.export(path, size=SIZE, direction=(1.0, -1.0, 0.45))
 
 
-@picture("Stack", "Boxes of the scene `stack` while they settle.")
+@picture("Stack", "The boxes of the scene `stack` after 0.3 s.")
 def stack(path: str) -> None:
     with World(read_scene("stack"), "mujoco") as world:
         world.step(300)
@@ -106,7 +106,7 @@ def lander(path: str) -> None:
         viewer.export(path, size=SIZE, direction=(0.5, -1.0, 0.3))
 
 
-@picture("Cart-pole", "State feedback catches a pole that begins at 23 degrees.", ".webp")
+@picture("Cart-pole", "State feedback balances a pole that starts at 23 degrees from the vertical.", ".webp")
 def cart_pole(path: str) -> None:
     robot = SceneRobot("cart_pole", dynx.load("cart_pole"), q=[0.0, 0.4])
     world = World(Scene("cart-pole", robots=[robot]), "mujoco")
@@ -125,7 +125,7 @@ def gripper(path: str) -> None:
         viewer.export(path, size=FILM)
 
 
-@picture("R2D2", "The robot of PyBullet's first example, with the materials of its description.")
+@picture("R2D2", "The robot of PyBullet's first example, in the colours of its description.")
 def r2d2(path: str) -> None:
     import pybullet_data
 
@@ -145,7 +145,7 @@ def contacts(path: str) -> None:
 
 @picture(
     "Inertia ellipsoids",
-    "For each link, the ellipsoid of uniform density that has the link's mass and inertia.",
+    "On each link of a Solo, the ellipsoid of uniform density that has the link's mass and inertia.",
 )
 def inertia_ellipsoids(path: str) -> None:
     model = dynx.load("solo12", base="floating")
@@ -164,7 +164,9 @@ def frames(path: str) -> None:
 
 
 @picture(
-    "Two engines", "A ball hits pins: PyBullet's result is solid, MuJoCo's is see-through and blue.", ".webp"
+    "Two engines",
+    "A ball hits pins. PyBullet's result is solid, MuJoCo's result is see-through and blue.",
+    ".webp",
 )
 def two_engines(path: str) -> None:
     run = compare_engines(read_scene("bowling"), ["pybullet", "mujoco"], duration=1.2, samples=60)
@@ -174,7 +176,7 @@ def two_engines(path: str) -> None:
 
 @picture(
     "Gravity torques",
-    "Arrows along the joint axes: the length is the torque over its limit; the number is the torque.",
+    "Arrows along the joint axes. The length is the torque divided by its limit, the number is the torque.",
 )
 def gravity_torques(path: str) -> None:
     with dynx.load("panda").view(q=[0, 0.5, 0, -1.6, 0, 2.1, 0.8, 0.02], whole_meshes=True) as viewer:
@@ -183,7 +185,7 @@ def gravity_torques(path: str) -> None:
 
 
 @picture(
-    "Manipulability", "The ellipsoid has the velocities of the flange for all joint velocities of norm 1."
+    "Manipulability", "The ellipsoid of the velocities that the flange has for joint velocities of norm 1."
 )
 def manipulability(path: str) -> None:
     with dynx.load("ur5").view(q=[0.6, -0.9, 1.2, -1.8, -1.57, 0.3], whole_meshes=True) as viewer:
@@ -192,7 +194,8 @@ def manipulability(path: str) -> None:
 
 
 @picture(
-    "Collision shapes", "The convex hulls that engines use for collisions of a Panda, over its visual shapes."
+    "Collision shapes",
+    "The convex hulls that engines use for collisions of a Panda, drawn over its visual shapes.",
 )
 def collision_shapes(path: str) -> None:
     with dynx.load("panda").view(q=[0, -0.5, 0, -2.1, 0, 1.6, 0.8, 0.02], whole_meshes=True) as viewer:
@@ -200,14 +203,14 @@ def collision_shapes(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("Names", "Names of links. Names without room are left out.")
+@picture("Names", "Names of the links of a hand. Names that would overlap others are left out.")
 def names(path: str) -> None:
     with dynx.load("allegro_right_hand").view(whole_meshes=True) as viewer:
         viewer.set_shown("names")
         viewer.export(path, size=SIZE, direction=(1.0, 0.4, 0.4))
 
 
-@picture("A path", "The program adds the path of the tip of a double pendulum to the film.", ".webp")
+@picture("A path", "A falling double pendulum. The program adds the path of its tip as a line.", ".webp")
 def path_of_a_tip(path: str) -> None:
     rollout = dynx.simulate(
         dynx.load("dynx_double_pendulum", base_pose=dynx.Pose((0.0, 0.0, 2.2))),
@@ -224,7 +227,7 @@ def path_of_a_tip(path: str) -> None:
         viewer.export(path, size=FILM, direction=(0.4, -1.0, 0.15))
 
 
-@picture("Dark", "Talos at night: `dark=True`, for pages, pictures and films.")
+@picture("Dark", "Talos on a dark background. `dark=True` works for pages, pictures and films.")
 def dark(path: str) -> None:
     with dynx.load("talos").view(dark=True, whole_meshes=True) as viewer:
         viewer.export(path, size=SIZE, direction=(1.0, -0.6, 0.3))
@@ -245,7 +248,7 @@ def many_robots(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("A duck", "A mesh with an image. Contacts use the convex hull of the mesh.")
+@picture("A duck", "A mesh with an image as its texture. Contacts use the convex hull of the mesh.")
 def duck(path: str) -> None:
     with World(read_scene("duck"), "mujoco") as world:
         world.step(300)
@@ -254,7 +257,7 @@ def duck(path: str) -> None:
             viewer.export(path, size=SIZE)
 
 
-@picture("Mobile robot", "TIAGo with words that the program adds.")
+@picture("Mobile robot", "TIAGo with a text that the program adds.")
 def mobile_robot(path: str) -> None:
     with dynx.load("tiago").view(whole_meshes=True) as viewer:
         viewer.text("TIAGo", (0.35, 0.4, 0.9), colour="blue", size=26)
@@ -263,12 +266,12 @@ def mobile_robot(path: str) -> None:
 
 HEAD = """# Gallery
 
-The program below each picture or film draws it, without a browser and without a graphics processor. The
-programs need the extras `viewer`, `world`, `film` and `mujoco`. A program takes up to two minutes.
-`python -m docs.gallery` runs all programs.
+Each picture or film was drawn by the program below it, without a browser and without a graphics processor.
+The programs need the extras `viewer`, `world`, `film` and `mujoco`. A program takes up to two minutes. In a
+clone, `python -m docs.gallery` runs all programs.
 
-`dynx play` also shows Gymnasium's own lander (extra `train`). This environment draws its own pictures, so it
-is not on this page.
+Gymnasium's own lander (extra `train`), which `dynx play` also shows, is not on this page. This environment
+draws its own pictures.
 """
 
 

@@ -72,15 +72,18 @@ def page(entries: Sequence[Entry]) -> str:
     lines = [
         "# Real robots: why engines differ on them",
         "",
-        "Written by `python -m docs.survey`. Each engine loads every file by the call that its users use, "
-        "with a fixed and with a floating base. dynx compares the results with reference values; see "
-        "[doctor](doctor.md). The tables list only proved causes. The effect of a cause is the change of an "
-        "engine's result when dynx removes only this cause, relative to the largest reference value. "
-        "`no answer` means that the engine refuses the file, or cannot compute the quantity, until the cause "
-        "is removed. `present` means contact forces, which have no number. [Rules](rules.md) explains the "
-        "rules.",
+        "Written by `python -m docs.survey`. Each engine loads every file by the call that users of the "
+        "engine make, with a fixed and with a floating base. dynx compares the results with reference values "
+        "([doctor](doctor.md)). A file *differs* if a result of at least one engine differs from them. A "
+        "file is *refused* if dynx cannot read it. The tables list only proved causes, each with the number "
+        "of its places in the file, and with the engines that it affects. The effect of a cause is the "
+        "change of an engine's result when dynx removes only this cause, relative to the largest reference "
+        "value. If several places or engines have the cause, the table has the largest effect. `no answer` "
+        "means that the engine refuses the file, or cannot compute the quantity, until the cause is removed. "
+        "`present` means that the cause changes contact forces, for which the table has no number. "
+        "[Rules](rules.md) explains the causes.",
         "",
-        "[Public files](public_files.md) has figures on files that were not used to develop the doctor.",
+        "[Public files](public_files.md) has figures on files on which the doctor was not developed.",
         "",
     ]
     for group, title in GROUPS.items():
@@ -96,7 +99,10 @@ def page(entries: Sequence[Entry]) -> str:
         lines += merged([row for entry in of for row in rows(entry)])
         left = [f"- {label(entry)}, {entry['base']}: {line}" for entry in of for line in exceptions(entry)]
         if left:
-            unread = "Files that dynx did not examine, or that an engine does not load even after the repair:"
+            unread = (
+                "Files that dynx refused, and engines that were not used for a file, or do not load it even "
+                "after dynx's repair:"
+            )
             lines += ["", unread, "", *left]
         lines.append("")
     return "\n".join(lines)
