@@ -171,7 +171,7 @@ def main() -> None:
     """Print the tables."""
     coefficients = (0.0, 0.1, 0.5, 1.5)
     print(
-        "| friction of the two | geometric mean (expected) | "
+        "| friction of the two surfaces | geometric mean (expected) | "
         + " | ".join(WORLDS)
         + " |\n"
         + "|---|---|"
@@ -188,7 +188,7 @@ def main() -> None:
     steps = (4e-3, 2e-3, 1e-3)
     heads = [f"{engine}, {1e3 * dt:g} ms" for engine in engines for dt in steps]
     print(
-        "\n| restitution of the two | expected height | "
+        "\n| restitution of the two surfaces | expected height | "
         + " | ".join(heads)
         + " |\n|---|---|"
         + "---|" * len(heads)
