@@ -40,9 +40,9 @@ _LOADED = "dynx.load(path)"
 _EULER = "roll, pitch, yaw [rad]"
 
 PYBULLET = {
-    "addUserDebugLine": _VIEW,
-    "addUserDebugParameter": _VIEW,
-    "addUserDebugText": _VIEW,
+    "addUserDebugLine": "`viewer.line(...)`, where `viewer` is World.view()",
+    "addUserDebugParameter": "`viewer.slider(...)`, where `viewer` is World.view()",
+    "addUserDebugText": "`viewer.text(...)`, where `viewer` is World.view()",
     "applyExternalForce": _FORCE,
     "applyExternalTorque": _FORCE,
     "calculateInverseKinematics": "Backend.inverse_kinematics(pose, frame)",
@@ -137,9 +137,11 @@ PINOCCHIO = {
     "computeTotalMass": "Model.total_mass",
     "difference": "Model.difference(q0, q1)",
     "forwardKinematics": "Backend.forward_kinematics(q, frame)",
-    "getFrameId": "the name of the frame, which dynx takes everywhere; Model.frame_names lists them",
+    "getFrameId": "no such call, because calls of dynx take the name of a frame; Model.frame_names lists the "
+    "names",
     "getFrameJacobian": "Backend.jacobian(q, frame, reference='local')",
-    "getJointId": "the name of the joint, which dynx takes everywhere; Model.joint_names lists them",
+    "getJointId": "no such call, because calls of dynx take the name of a joint; Model.joint_names lists the "
+    "names",
     "getJointJacobian": "Backend.jacobian(q, link, reference='local') of the child link",
     "integrate": "Model.integrate(q, v)",
     "neutral": "Model.neutral()",
@@ -161,7 +163,7 @@ MUJOCO = {
     "mj_integratePos": "Model.integrate(q, v)",
     "mj_jacBody": "Backend.jacobian(q, frame)",
     "mj_jacSite": "Backend.jacobian(q, frame)",
-    "mj_name2id": "the name of the part, which dynx takes everywhere",
+    "mj_name2id": "no such call, because calls of dynx take the name of a part",
     "mj_ray": "World.cast_rays(origins, directions)",
     "mj_resetData": "World.reset()",
     "mj_rne": "Backend.inverse_dynamics(q, v, a)",
@@ -174,7 +176,7 @@ MUJOCO = {
 
 DRAKE = {
     "AdvanceTo": "World.run(duration)",
-    "CalcBiasSpatialAcceleration": "Backend.jacobian_derivative(q, v, frame), times v",
+    "CalcBiasSpatialAcceleration": "`Backend.jacobian_derivative(q, v, frame) @ v`",
     "CalcInverseDynamics": "Backend.inverse_dynamics(q, v, a, joint_dynamics=True), which includes gravity, "
     "damping and dry friction",
     "CalcMassMatrix": "Backend.mass_matrix(q, joint_dynamics=True)",
@@ -200,7 +202,7 @@ DRAKE = {
 """Methods and classes of Drake, besides those of quantities."""
 
 ROBOTICSTOOLBOX = {
-    "DHRobot": f"{_LOADED}; a table of Denavit and Hartenberg is not read",
+    "DHRobot": f"{_LOADED}, which reads no table of Denavit-Hartenberg parameters",
     "ERobot": _LOADED,
     "accel": "Backend.forward_dynamics(q, v, tau)",
     "coriolis": "Backend.coriolis_matrix(q, v)",
@@ -212,7 +214,7 @@ ROBOTICSTOOLBOX = {
     "ikine_GN": "Backend.inverse_kinematics(pose, frame)",
     "ikine_LM": "Backend.inverse_kinematics(pose, frame)",
     "ikine_NR": "Backend.inverse_kinematics(pose, frame)",
-    "inertia": "Backend.mass_matrix(q); Model.inertial(link) is that of a link",
+    "inertia": "Backend.mass_matrix(q); Model.inertial(link) is the inertia of a link",
     "jacob0": "Backend.jacobian(q, frame)",
     "jacob0_dot": "Backend.jacobian_derivative(q, v, frame)",
     "jacobe": "Backend.jacobian(q, frame, reference='local')",
@@ -226,11 +228,11 @@ ROBOTICSTOOLBOX = {
 """Functions and methods of roboticstoolbox."""
 
 GYMNASIUM = {
-    "VectorEnv": "gymnasium.make_vec('dynx/CartPole-v0', num_envs=1024), one compiled kernel",
-    "action_space": "gymnasium.make('dynx/CartPole-v0') after `import dynx.envs`",
+    "VectorEnv": "the environments that gymnasium.make_vec('dynx/CartPole-v0', num_envs=1024) returns",
+    "action_space": "`env.action_space` of an environment from gymnasium.make",
     "make": "gymnasium.make('dynx/CartPole-v0', engine='mujoco') after `import dynx.envs`",
     "make_vec": "gymnasium.make_vec('dynx/CartPole-v0', num_envs=1024) after `import dynx.envs`",
-    "observation_space": "gymnasium.make('dynx/CartPole-v0') after `import dynx.envs`",
+    "observation_space": "`env.observation_space` of an environment from gymnasium.make",
 }
 """Functions, classes and attributes of Gymnasium."""
 
