@@ -25,7 +25,7 @@ from dynx.sim import simulate
 from dynx.spatial.scalar import Floats
 
 TUTORIAL = "tutorial's loop, PyBullet alone"
-TUTORIAL_SUBSTEPS = "the same, 10 sub-steps"
+TUTORIAL_SUBSTEPS = "tutorial's loop, 10 sub-steps"
 TUTORIAL_NUMPY = "tutorial's loop, with NumPy"
 BARE = "NumPy and pin, by hand"
 DYNX = "dynx, controller and plant pinocchio"
