@@ -766,6 +766,11 @@ class _TreeReader:
         if stiffness and reading.number_or(element, "springyield", what, 0.0):
             reading.note(element, f"springyield of {what} is not read: its spring is elastic")
         friction = reading.number_or(element, "frictionloss", what, 0.0)
+        for name, value in (("damping", coefficients["damping"]), ("frictionloss", friction)):
+            if value < 0.0:
+                reading.note(element, f"the {name} of {what} is negative, so the joint gains energy")
+        if stiffness < 0.0:
+            reading.note(element, f"the stiffness of {what} is negative, so the spring pushes the joint away")
         return JointDynamics(
             stiffness=stiffness,
             spring_reference=self._position(element, "springref", kind, what),
@@ -862,11 +867,14 @@ class _TreeReader:
     # -- the rest -------------------------------------------------------------------------------
 
     def _frames(self) -> list[Frame]:
-        taken, frames = {link.name for link in self._parts.links}, []
+        taken, frames, sites = {link.name for link in self._parts.links}, [], set[str]()
         for name, link, pose, element in self._parts.sites:
             fault = name_fault(name)
             if fault is not None:
                 raise self._reading.error(element, f"the name of a site {fault}")
+            if name in sites:
+                raise self._reading.error(element, f"two sites have the name {shown(name)}")
+            sites.add(name)
             free = name if name not in taken else free_name(f"{name}_site", taken)
             if free != name:
                 self._reading.note(

@@ -119,6 +119,10 @@ class _RobotReader:
     def read(self) -> Description:
         reading = self._reading
         links = [part for part in self._parts if part.kind == "link"]
+        for scope in {id(each): each for each in (self._top, *(part.scope for part in self._parts))}.values():
+            if scope.element.attributes.get("canonical_link"):
+                # It need not matter to any pose, and its name is to be right.
+                self._frames.link_of(scope)
         connections = list(self._connections())
         held = self._take_hold(connections)
         components = self._components(links, connections)

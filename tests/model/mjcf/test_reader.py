@@ -367,6 +367,45 @@ FAULTS = {
         "8: <motor> acts on the joint 'hing'",
     ),
     "include": (WITHOUT, '<include file="x.xml"/>', DescriptionError, "not read from a file"),
+    "end tag": ("</body>", "", DescriptionError, "8: not well-formed XML: mismatched tag"),
+    "quote": ('"0 1 0"', '"0 1 0', DescriptionError, "6: not well-formed XML: invalid token"),
+    "attribute twice": ('name="hinge"', 'name="hinge" name="x"', DescriptionError, "duplicate attribute"),
+    "document type": ("<mujoco", '<!DOCTYPE a [<!ENTITY b "c">]><mujoco', DescriptionError, "not allowed"),
+    "infinite": ('size="0.1"', 'size="1e999"', DescriptionError, "6: size in <geom> of a geom is '1e999'"),
+    "kind": ('axis="0 1 0"', 'type="hinj"', DescriptionError, "5: type of a joint is 'hinj'"),
+    "flag": ('"radian"', '"radian" autolimits="maybe"', DescriptionError, "2: autolimits of <compiler>"),
+    "no mass": (
+        WITHOUT,
+        '<inertial pos="0 0 0" diaginertia="1 1 1"/>',
+        DescriptionError,
+        "6: <inertial> of body 'link' has no attribute mass",
+    ),
+    "classes": (
+        "<worldbody>",
+        '<default><default class="a"/><default class="a"/></default><worldbody>',
+        DescriptionError,
+        "3: the class 'a' of <default> is defined twice",
+    ),
+    "class without a name": (
+        "<worldbody>",
+        "<default><default/></default><worldbody>",
+        DescriptionError,
+        "3: a <default> inside another one has no class",
+    ),
+    "one point": (
+        'size="0.1"',
+        'type="capsule" size="0.1" fromto="0 0 0 0 0 0"',
+        DescriptionError,
+        "6: the two points of fromto of a geom are one",
+    ),
+    "sites": ("</body>", '<site name="a"/><site name="a"/></body>', DescriptionError, "7: two sites have"),
+    "attach": (
+        WITHOUT,
+        '<attach model="other" body="b" prefix="p"/>',
+        DescriptionError,
+        "6: <attach> names the model 'other'",
+    ),
+    "armature": ('axis="0 1 0"', 'armature="x"', DescriptionError, "5: armature in <joint>"),
 }
 
 
@@ -377,6 +416,7 @@ def test_faults_are_errors_with_the_line(fault: str) -> None:
     with pytest.raises(kind) as raised:
         dynx.load(ARM.replace(old, new, 1))
     assert message in str(raised.value)
+    assert raised.value.line is not None
 
 
 @pytest.mark.parametrize("inside", ["<flexcomp/>", '<geom masss="1"/>', "<body><jiont/></body>"])

@@ -56,6 +56,14 @@ def test_a_file_moves_as_in_mujoco() -> None:
     np.testing.assert_allclose(found.q[-1], data.qpos, rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.parametrize("coefficient", ["damping", "frictionloss", "stiffness"])
+def test_a_negative_coefficient_is_read_and_named(coefficient: str) -> None:
+    """MuJoCo takes it, and the joint gains energy there as well."""
+    text = LEG.format("").replace('stiffness="12" springref="20" damping="0.3"', f'{coefficient}="-0.5"')
+    (note,) = dynx.load(text).notes
+    assert str(note).startswith(f"line 2: the {coefficient} of joint 'hip' is negative, so the ")
+
+
 def test_what_is_not_read_of_springs_is_named() -> None:
     def notes(attributes: str) -> str:
         return "\n".join(map(str, dynx.load(LEG.format("").replace('stiffness="12"', attributes)).notes))

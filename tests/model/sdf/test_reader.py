@@ -557,6 +557,74 @@ FAULTS = {
         "7: <use_parent_model_frame>",
     ),
     "names": ('name="base"', 'name=""', DescriptionError, "2: the name of a <link> is empty"),
+    "end tag": ("</joint>\n", "\n", DescriptionError, "9: not well-formed XML: mismatched tag"),
+    "quote": ('name="hinge"', 'name="hinge', DescriptionError, "5: not well-formed XML: invalid token"),
+    "attribute twice": ('name="hinge"', 'name="hinge" name="x"', DescriptionError, "duplicate attribute"),
+    "infinite": ("0 0 1 0 0 0", "0 0 1e999 0 0 0", DescriptionError, "3: pose in <pose> of link 'link'"),
+    "no child": ("<child>link</child>", "", DescriptionError, "5: joint 'hinge' has no <child>"),
+    "no parent": ("<parent>base</parent>", "", DescriptionError, "5: joint 'hinge' has no <parent>"),
+    "no name": (' name="hinge"', "", DescriptionError, "5: a <joint> has no name"),
+    "expressed in": ("<xyz>", '<xyz expressed_in="bse">', DescriptionError, "7: joint 'hinge' names 'bse'"),
+    "heavy": (
+        '"base"/>',
+        '"base"><inertial><mass>heavy</mass></inertial></link>',
+        DescriptionError,
+        "2: mass in <inertial> of link 'base' is 'heavy'",
+    ),
+    "moment": (
+        '"base"/>',
+        '"base"><inertial><inertia><izz>x</izz></inertia></inertial></link>',
+        DescriptionError,
+        "2: izz in <inertia> of link 'base' is 'x'",
+    ),
+    "geometry": (
+        '"base"/>',
+        '"base"><collision name="c"><geometry><bx/></geometry></collision></link>',
+        DescriptionError,
+        "2: <geometry> has the unknown element <bx>",
+    ),
+    "models": (
+        "</model>",
+        '</model><model name="more"><link name="a"/></model>',
+        UnsupportedFeatureError,
+        "9: the file holds 0 worlds and 2 models",
+    ),
+    "attached": (
+        "</model>",
+        '<frame name="f" attached_to="nowhere"/></model>',
+        DescriptionError,
+        "9: frame 'f' names 'nowhere'",
+    ),
+    "attached in a circle": (
+        "</model>",
+        '<frame name="f" attached_to="g"/><frame name="g" attached_to="f"/></model>',
+        DescriptionError,
+        "9: frame 'f' is attached to itself, by way of others",
+    ),
+    "canonical": (
+        'name="arm"',
+        'name="arm" canonical_link="bse"',
+        DescriptionError,
+        "1: the canonical link of model 'arm' names 'bse'",
+    ),
+    "placement": (
+        'name="arm"',
+        'name="arm" placement_frame="bse"',
+        DescriptionError,
+        "1: model 'arm' names 'bse'",
+    ),
+    "static": (
+        '<link name="base"/>',
+        '<static>perhaps</static><link name="base"/>',
+        DescriptionError,
+        "2: static of model 'arm' is 'perhaps'",
+    ),
+    "damping": (
+        XYZ,
+        f"{XYZ}<dynamics><damping>x</damping></dynamics>",
+        DescriptionError,
+        "7: damping in <dynamics> of joint 'hinge' is 'x'",
+    ),
 }
 
 
@@ -567,6 +635,7 @@ def test_faults_are_errors_with_the_line(fault: str) -> None:
     with pytest.raises(kind) as raised:
         dynx.load(ARM.replace(old, new, 1))
     assert message in str(raised.value)
+    assert raised.value.line is not None
 
 
 def test_every_element_that_is_not_used_is_named_once() -> None:
