@@ -17,24 +17,31 @@ PAGE = Path(__file__).with_name("pairs.md")
 
 HEAD = """# Public robots in two formats: is it the same robot?
 
-`python -m docs.pairs` writes this page from a survey. The survey runs [`dynx same`](same.md) on robots that
-public repositories describe in more than one format. A pair is a URDF file and an MJCF or SDF file. The
-URDF file is from the same repository, from another one, or from example-robot-data. The files share a word
-of their paths, and most names of their joints.
+`python -m docs.pairs` writes this page from a survey. The survey runs [`dynx same`](same.md) on robots
+that public repositories describe in more than one format. A pair is a URDF file and an MJCF or SDF
+file. The URDF file is from the same repository as the other file, from another repository, or from
+example-robot-data. The two files share a word in their paths or robot names, and at least half of their
+joint names. If both are in one repository, an equal number of joints suffices instead.
 
-- **The list** is `benchmarks/surveys/robot_pairs.tsv`: repository, commit, path and SHA-256 of each file. A
-  program chose the pairs. It takes at most {most} files of a format of a repository for one URDF file.
-- **The tolerance is {tolerance:g}**, since many files have four or five digits.
-- **A verdict is about rigid-body dynamics.** Limits, damping, armature, actuators and shapes are not part
-  of it.
+- **The list** is `benchmarks/surveys/robot_pairs.tsv`: repository, commit, path and SHA-256 of each
+  file. A program chose the pairs. For one URDF file it takes at most {most} MJCF files and {most} SDF
+  files of a repository.
+- **The tolerance is {tolerance:g}**, since the numbers in many files have four or five digits.
+- **A verdict is about rigid-body dynamics.** Limits, damping, armature, actuators and shapes do not
+  affect the verdict.
 - **Different does not mean wrong.** Two files often describe two versions of a robot, or one file has a
   hand, a sensor or a fixed joint that the other file lacks.
-- **Engines without dynx check each report.** Pinocchio loads the URDF file and MuJoCo the MJCF file. A
-  *missed* difference is one that the engines see and the report lacks, or one that remains after all named
-  elements are replaced. An *unreal* element changes no mass and no joint-space inertia in Pinocchio, if
-  only this element is reinserted. An engine cannot check a pair if it refuses a file.
-- **Half of the pairs were used in development**, chosen by a hash. The other half was compared
-  twice: the list of differences was mended between the two runs, and both runs missed no difference.
+- **Engines without dynx check each report.** Pinocchio loads the URDF file, MuJoCo the MJCF file, and
+  Drake the SDF file. The survey compares total mass and joint-space inertia of the two engines. The
+  last column has the largest relative difference, or `-` if an engine refuses a file or the robots have
+  different joints. A difference is *missed* if the engines show it and the report lacks it. A
+  difference that remains after all named elements are replaced is missed, too.
+- **Elements are checked one by one.** After all named elements are replaced, the survey reinserts one
+  element of the original file. It counts an element that then changes neither the mass nor the
+  joint-space inertia in Pinocchio.
+- **Half of the pairs were used in development**, chosen by a hash. The other half was compared twice.
+  The list of differences that `dynx same` reports was corrected between the two runs. Neither run
+  missed a difference.
 
 """
 

@@ -161,7 +161,11 @@ def contacts_tables(report: Mapping[str, Any]) -> str:
             cells.append(", ".join(f"`{name}`" for name in cases))
         by_engine.append((each["engine"], *cells))
     meanings = "".join(f"- *{rank}*: {wording.VERDICT_MEANINGS[rank]}\n" for rank in ranks)
-    heads = ("engine", "cases with an error that a setting causes", "cases with a figure that it cannot have")
+    heads = (
+        "engine",
+        "cases with an error that a setting causes",
+        "cases with an error because the engine lacks a parameter",
+    )
     return f"{table(('engine', *ranks), rows)}\n{meanings}\n{table(heads, by_engine)}"
 
 

@@ -12,9 +12,9 @@ RANKS = ("within", "falls", "cannot", "setting", "unexplained")
 """Verdicts in ascending order of how much they deserve a look."""
 
 VERDICT_MEANINGS = {
-    "within": "the error is within the tolerance at every step",
-    "falls": "the error falls with the step, at the order given",
-    "setting": "the error stays, and a setting of the engine is its cause, which a second run shows",
+    "within": "the error is within the tolerance at every time step",
+    "falls": "the error falls when the time step becomes shorter",
+    "setting": "the error stays, and a setting of the engine is its cause, as a run with another value shows",
     "cannot": "the exact value needs a parameter that the engine does not have",
     "unexplained": "the error stays, and no setting that dynx tries is its cause",
 }
