@@ -36,6 +36,8 @@ joint names. If both are in one repository, an equal number of joints suffices i
   last column has the largest relative difference, or `-` if an engine refuses a file or the robots have
   different joints. A difference is *missed* if the engines show it and the report lacks it. A
   difference that remains after all named elements are replaced is missed, too.
+- **Columns.** `elements` is the number of elements that differ. `largest difference` begins with the
+  [size](same.md#what-the-report-contains) of this difference, relative to a scale of the robot.
 - **Elements are checked one by one.** After all named elements are replaced, the survey reinserts one
   element of the original file. It counts an element that then changes neither the mass nor the
   joint-space inertia in Pinocchio.
