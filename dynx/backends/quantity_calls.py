@@ -25,7 +25,6 @@ from dynx.backends.solvability import Solvability
 from dynx.backends.straight import BindingCall, StraightCall, straight_call
 from dynx.errors import DTypeError, NotFiniteError, shown
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints_of_backend
 from dynx.spatial.scalar import Floats
 
 # Name, closing and pickling of a backend, apart from the quantities it computes.
@@ -137,7 +136,9 @@ class QuantityCalls(Lifecycle, EngineHooks):
     """Base of backends: checks of arguments, evaluation of quantities, and terms shared by all engines."""
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
-        if not self.takes_ball_joints:
+        if not self.takes_ball_joints and model.ball_joints:
+            from dynx.model.ball_joints import refuse_ball_joints_of_backend  # most robots have none
+
             refuse_ball_joints_of_backend(model, self.name)
         super().__init__(model, Arguments(model), validate=validate)
         self._mechanism = model.mechanism

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.files.pages import html_table
 from dynx.spatial.scalar import Floats
 
 Measures = tuple[float, float, float, int]
@@ -119,6 +118,8 @@ class IKResult:
         return f"<IKResult {self.message}{shape}>"
 
     def _repr_html_(self) -> str:
+        from dynx.files.pages import html_table  # most results are shown on no page
+
         if self.success.ndim:
             return html_table("inverse kinematics", {"result": self.message, "q": self.q.shape})
         values = {f"q[{k}]": f"{x:.6g}" for k, x in enumerate(self.q)}

@@ -11,6 +11,7 @@ from dynx.model.elements import (
     Limits,
     Link,
     Mimic,
+    NamedConfiguration,
     Note,
     Pose,
 )
@@ -29,6 +30,7 @@ __all__ = [
     "Mechanism",
     "Mimic",
     "Model",
+    "NamedConfiguration",
     "Note",
     "Pose",
     "build_mechanism",

@@ -201,6 +201,11 @@ def robot_differences(model: Model, back: Model) -> Iterator[str]:
         moving = {joint.name for joint in model.joints if joint.moves}
         if back.actuators != tuple(each for each in model.actuators if each.joint in moving):
             yield "the actuators differ"
+    if back.stated_configurations is not None:
+        yield from _missing("configuration", [*model.configurations], [*back.configurations])
+        for name in model.configurations:
+            if name in back.configurations and not _same_configuration(model, back, name):
+                yield f"configuration {shown(name)} differs"
     joints = {joint.name: joint for joint in back.joints}
     yield from _missing("joint", [joint.name for joint in model.joints], [*joints])
     for joint in model.joints:
@@ -213,6 +218,11 @@ def robot_differences(model: Model, back: Model) -> Iterator[str]:
         other = frames.get(frame.name)
         if other is not None and not _same_frame(frame, other, size):
             yield f"the placement of frame {shown(frame.name)} differs"
+
+
+def _same_configuration(model: Model, back: Model, name: str) -> bool:
+    mine, theirs = (each.configurations[name] for each in (model, back))
+    return mine.shape == theirs.shape and _close(theirs, mine)
 
 
 def _missing(kind: str, mine: list[str], theirs: list[str]) -> Iterator[str]:
@@ -249,7 +259,7 @@ def _tensor(inertial: Inertial) -> Floats:
 
 
 def _close(got: Floats, want: Floats) -> bool:
-    return bool(np.abs(got - want).max() <= ROUNDING * np.abs(want).max())
+    return bool(np.abs(got - want).max(initial=0.0) <= ROUNDING * np.abs(want).max(initial=0.0))
 
 
 def _joint_differences(mine: Joint, theirs: Joint, size: float) -> Iterator[str]:

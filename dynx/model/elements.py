@@ -357,6 +357,21 @@ class Actuator:
 
 
 @dataclass(frozen=True)
+class NamedConfiguration:
+    """A configuration that a robot description names, such as a keyframe of MJCF.
+
+    `positions` are those of joints by their names: one number [rad or m], or the unit quaternion (x, y, z, w)
+    of a ball joint. `base` is the pose of a floating base in the world: position [m] and unit quaternion
+    (x, y, z, w). What is not stated is neutral.
+    """
+
+    name: str
+    positions: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    base: tuple[float, ...] | None = None
+    line: int | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
 class Frame:
     """A named frame fixed to a link; every link has one with its own name at the identity."""
 

@@ -233,6 +233,8 @@ def build_described(
             source=source,
             line=content.unread.line,
         ) from None
+    if content.configurations is not None:
+        model = replace(model, stated_configurations=content.configurations)
     return _with_frames(model, content.frames, source) if content.frames else model
 
 

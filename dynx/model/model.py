@@ -37,8 +37,8 @@ class Model(Tree):
     fixed base has the pose `base_pose` in the world.
 
     `geometry` holds the visual and collision shapes of the links, `contact_filter` which of them may touch,
-    `actuators` what drives the joints. They affect no dynamics without contacts and commands, so models that
-    differ in them alone are equal.
+    `actuators` what drives the joints, `configurations` which positions have names. They affect no dynamics
+    without contacts and commands, so models that differ in them alone are equal.
 
     Models are immutable; they compare by content (`==`), hash and pickle.
     """
@@ -160,6 +160,14 @@ class Model(Tree):
         if name in self._frame_index:
             raise ArgumentError(f"frame {shown(name)} exists already in {self.name}")
         return replace(self, extra_frames=(*self.extra_frames, Frame(name, link, placement)))
+
+    @door("dynx.model.named_configurations:with_configuration")
+    def with_configuration(self, name: str, q: ArrayLike) -> Model:
+        """Return the same robot with one more named configuration `q` (nq,), which `configurations` returns.
+
+        `to_mjcf` writes it as a keyframe. Raises ArgumentError for a name that is taken.
+        """
+        raise NotImplementedError
 
     @door("dynx.viewer.viewer:view")
     def view(self, **options: Any) -> Any:

@@ -11,8 +11,20 @@ import numpy as np
 
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.elements import IDENTITY, Actuator, Frame, Inertial, Joint, Link, Note, Pose, Vector
+from dynx.model.elements import (
+    IDENTITY,
+    Actuator,
+    Frame,
+    Inertial,
+    Joint,
+    Link,
+    NamedConfiguration,
+    Note,
+    Pose,
+    Vector,
+)
 from dynx.model.geometry.links import ContactFilter, Geometry
+from dynx.registry import door
 from dynx.spatial.scalar import Floats
 
 Base = Literal["fixed", "floating"]
@@ -43,6 +55,8 @@ class Tree:
     """Actuators of the joints, as data; None if the description format has none, as URDF and SDF."""
     contact_filter: ContactFilter | None = field(default=None, compare=False)
     """Which collision shapes may touch; None if the description format does not say, as URDF and SDF."""
+    stated_configurations: tuple[NamedConfiguration, ...] | None = field(default=None, compare=False)
+    """Configurations that the description names, by joints; None if its format has none, as URDF and SDF."""
 
     def __post_init__(self) -> None:
         if self.floating and self.base_pose != IDENTITY:
@@ -168,6 +182,15 @@ class Tree:
             self.coordinate_index(joint)
         return self._first_indices[joint][0]
 
+    @cached_property
+    def configurations(self) -> Mapping[str, Floats]:
+        """Named configurations q (nq,) of the description, such as keyframes of MJCF; read-only arrays."""
+        return self._named_configurations()
+
+    @door("dynx.model.named_configurations:named_configurations")
+    def _named_configurations(self) -> Mapping[str, Floats]:
+        raise NotImplementedError
+
     # -- limits ------------------------------------------------------------------------------
 
     @cached_property
@@ -287,6 +310,7 @@ class Description:
     base_pose: Pose = IDENTITY
     actuators: tuple[Actuator, ...] | None = None
     contact_filter: ContactFilter | None = None
+    configurations: tuple[NamedConfiguration, ...] | None = None
 
 
 def checked_base(base: str) -> Literal["fixed", "floating"]:

@@ -10,6 +10,7 @@ from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
     FiniteRange,
     GroupedCommand,
+    configuration_option,
     engine_option,
     engines_option,
     finite_number,
@@ -17,7 +18,6 @@ from dynx.cli.shell.options import (
     json_option,
     name_list,
     quiet_option,
-    sample_option,
     settings_option,
     silent_option,
 )
@@ -263,7 +263,7 @@ def compare() -> None:
         type=click.Choice(["fixed", "floating"]),
         help="Base of a robot (default: that of an MJCF or SDF file, else fixed).",
     ),
-    sample_option("q", "Configuration of a robot (default: neutral)"),
+    configuration_option("Configuration of a robot (default: neutral)"),
     click.option(
         "--shapes",
         metavar="ROBOT",

@@ -10,6 +10,7 @@ from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
     F,
     FiniteRange,
+    configuration_option,
     frame_option,
     gravity_option,
     json_option,
@@ -23,7 +24,7 @@ from dynx.cli.shell.options import (
     wrench_on_frame,
 )
 
-_q_option = sample_option("q", "Configuration (default: neutral)")
+_q_option = configuration_option("Configuration (default: neutral)")
 _v_option = sample_option("v", "Velocity (default: zero)")
 
 
@@ -249,7 +250,7 @@ def mass() -> None:
     "position (only the rotation counts; alone it is roll,pitch,yaw [rad], qx,qy,qz,qw, or 9 numbers).",
 )
 @frame_option
-@sample_option("q", "Configuration at which the search starts (default: chosen by the solver)")
+@configuration_option("Configuration at which the search starts (default: chosen by the solver)")
 @click.option(
     "--all-solutions",
     "every",

@@ -9,7 +9,9 @@ import click
 from dynx.cli.shell.kinds import gain, option_groups
 from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
+    CONFIGURATION_FORM,
     GroupedCommand,
+    configuration_text,
     engine_option,
     finite_number,
     gravity_option,
@@ -27,7 +29,7 @@ PROFILES = ("cycloidal", "cubic", "quintic", "trapezoidal", "s-curve", "hold")
 
 _seconds_option = partial(click.option, type=finite_number, metavar="SECONDS")
 _gain_option = partial(click.option, type=gain, metavar="NUMBERS")
-_configuration_option = partial(click.option, type=number_list, metavar="Q")
+_configuration_option = partial(click.option, type=configuration_text, metavar="Q")
 
 _robot = group(
     "Robot",
@@ -38,12 +40,14 @@ _robot = group(
 _motion = (
     _configuration_option(
         "--to",
-        help="Target configuration [rad or m]: 0,1.5,... or joint=value,... (default: that of --from).",
+        help=f"Target configuration [rad or m]: {CONFIGURATION_FORM} (default: that of --from).",
     ),
-    _configuration_option(
+    click.option(
         "--to-pose",
         "--target",
         "to_pose",
+        type=number_list,
+        metavar="NUMBERS",
         help="Target position or pose of --frame, reached on a straight line, as x,y,z[,roll,pitch,yaw] "
         "[m, rad]; instead of --to.",
     ),

@@ -54,6 +54,7 @@ def model_document(model: Model) -> dict[str, Any]:
             }
             for link in model.links
         ],
+        "configurations": {name: q.tolist() for name, q in model.configurations.items()},
         "notes": [asdict(note) for note in model.notes],
     }
 
@@ -95,6 +96,8 @@ def _show(model: Model) -> None:
     added = [frame.name for frame in model.extra_frames]
     if added:
         out.print(f"frames besides the links: {', '.join(map(one_line, added))}")
+    if model.configurations:
+        out.print(f"named configurations: {', '.join(map(one_line, model.configurations))}")
     for note in model.notes:
         out.print(f"note: {one_line(note)}", style="yellow")
 

@@ -79,8 +79,14 @@ def open_backend(
         return backend("compiled", model)
 
 
-def configuration(model: Model, given: Numbers, option: str = "--q", default: Floats | None = None) -> Floats:
-    """Return q (nq,): `given`, where joints without a value keep `default` (None: the neutral one)."""
+def configuration(
+    model: Model, given: Numbers | str, option: str = "--q", default: Floats | None = None
+) -> Floats:
+    """Return q (nq,): `given`, where joints without a value keep `default` (None: the neutral one).
+
+    A `str` is the name of one of `Model.configurations`."""
+    if isinstance(given, str):
+        return _named_configuration(model, given, option)
     base = ["x", "y", "z", "qx", "qy", "qz", "qw"] if model.floating else []
     start = model.neutral() if default is None else default.copy()
     q = checked_q(model, _filled(model, given, start, base, model.position_names, option), option)
@@ -88,6 +94,14 @@ def configuration(model: Model, given: Numbers, option: str = "--q", default: Fl
         for note in position_notes(model, q, option):
             remark(note)
     return q
+
+
+def _named_configuration(model: Model, name: str, option: str) -> Floats:
+    try:
+        return np.array(model.configurations[name])
+    except UnknownNameError as error:
+        hint = "" if model.configurations else "; wanted numbers, such as 0,1.5,... or joint=value,..."
+        raise UnknownNameError(f"{option}: {error}{hint}") from error
 
 
 def velocity(model: Model, given: Numbers, option: str) -> Floats:

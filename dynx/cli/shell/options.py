@@ -19,6 +19,11 @@ STANDARD_OUTPUT = "-"
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+CONFIGURATION_FORM = "0,1.5,... or joint=value,... or the name of a keyframe of the robot's MJCF file"
+"""Forms of `configuration_text`."""
+
+_NAME = re.compile(r"(?!(?:nan|inf(?:inity)?)\b)[^\W\d][^=,]*", re.IGNORECASE)
+
 
 def number_list(text: str) -> list[float] | dict[str, float]:
     """Read numbers separated by commas or white space, or ``joint=value`` pairs as a dictionary."""
@@ -32,6 +37,12 @@ def number_list(text: str) -> list[float] | dict[str, float]:
             raise click.BadParameter(f"{shown(name)} is given twice")
         named[name] = value
     return named
+
+
+def configuration_text(text: str) -> list[float] | dict[str, float] | str:
+    """Read numbers as `number_list` does, or the name of a configuration, which begins with a letter."""
+    name = text.strip()
+    return name if _NAME.fullmatch(name) else number_list(text)
 
 
 def plain_numbers(text: str) -> list[float]:
@@ -366,8 +377,14 @@ def robot_options(command: F) -> F:
     )(command)
 
 
+def configuration_option(quantity: str) -> Callable[[F], F]:
+    """Return the option ``--q``, whose value is a configuration."""
+    help_ = f"{quantity}: {CONFIGURATION_FORM}"
+    return click.option("--q", type=configuration_text, metavar="Q", help=help_)
+
+
 def sample_option(name: str, quantity: str) -> Callable[[F], F]:
-    """Return an option such as ``--q``, whose value is the vector of one sample."""
+    """Return an option such as ``--v``, whose value is the vector of one sample."""
     return click.option(
         f"--{name}", type=number_list, metavar="NUMBERS", help=f"{quantity}: 0,1.5,... or joint=value,..."
     )

@@ -39,6 +39,7 @@ _SOFTNESS = frozenset(["margin", "solimp", "solref"])
 ATTRIBUTES: dict[str, frozenset[str]] = {
     "body": _POSE | {"name", "childclass", "mocap", "gravcomp", "user", "sleep"},
     "frame": _POSE | {"name", "childclass"},
+    "key": frozenset(["name", "time", "qpos", "qvel", "act", "ctrl", "mpos", "mquat", "plastic"]),
     "inertial": _POSE | {"mass", "diaginertia", "fullinertia"},
     "freejoint": frozenset(["name", "group", "align"]),
     "replicate": frozenset(["count", "offset", "euler", "sep", "childclass", "prefix"]),

@@ -58,7 +58,7 @@ def _document(
     """Return the document of a root element; `around` are the files of the models that attach it."""
     Includes(reading, folders, source).expand(root)
     require_bounded(root, reading)
-    for tag in ("compiler", "default", "worldbody"):
+    for tag in ("compiler", "default", "worldbody", "keyframe"):
         for section in root.all(tag):
             waiting = [section]
             while waiting:

@@ -30,6 +30,7 @@ from dynx.model.elements import (
     Limits,
     Link,
     Mimic,
+    NamedConfiguration,
     Note,
     Pose,
     Vector,
@@ -43,6 +44,7 @@ from dynx.model.mjcf.contacts import read_contacts
 from dynx.model.mjcf.document import MjcfText, turn
 from dynx.model.mjcf.expansion import read_document
 from dynx.model.mjcf.extension import MIMIC, Extension
+from dynx.model.mjcf.keyframes import NOT_OF_A_POSITION, TreeCoordinates, read_keyframes, tree_states
 from dynx.model.mjcf.shapes import Geom, GeomReader
 from dynx.model.package_search import StrPath
 from dynx.model.topology import MAX_LINKS
@@ -93,7 +95,7 @@ _NOT_IN_TREE = {
 }
 _OF_SCENES = ("equality", "contact", "keyframe")
 """Sections that a scene reads."""
-_OF_ONE_ROBOT = ("actuator", "contact")
+_OF_ONE_ROBOT = ("actuator", "contact", "keyframe")
 """Sections that are read of one robot, as data."""
 _IN_ROOT = frozenset(
     ["compiler", "option", "size", "statistic", "visual", "default", "asset", "worldbody", "custom"]
@@ -138,11 +140,19 @@ class MjcfTree:
     free: bool
     positions: tuple[tuple[str, float], ...]
     """Joints in the order of MuJoCo, each with its position in the pose of the file; a free one apart."""
+    aligned: bool = False
+    """Whether MuJoCo moves the frame of the free body to its centre of mass and principal axes."""
 
     @property
     def first(self) -> MjcfBody:
         """The body below which all others are."""
         return self.bodies[0]
+
+    @property
+    def coordinates(self) -> TreeCoordinates:
+        """The joints in the order of MuJoCo."""
+        T_world_free = self.first.T_world_body if self.free else None
+        return _coordinates(T_world_free, self.positions, self.description.joints)
 
 
 @dataclass(frozen=True)
@@ -208,6 +218,7 @@ class _TreeParts:
     sites: list[_NamedSite] = field(default_factory=list)
     bodies: list[MjcfBody] = field(default_factory=list)
     positions: list[tuple[str, float]] = field(default_factory=list)
+    aligned: bool = False
 
 
 class _TreeReader:
@@ -243,10 +254,13 @@ class _TreeReader:
         self._require_joints_of_motors(root)
         self._scale(self._total_mass_scale(root, self._parts.links))
         actuators, contact_filter = self._read_actuators(), self._contact_filter()
+        configurations = self._read_configurations(base)
         self._note_counts(root)
         self._document.options.note(self._reading, scene=False)
         content = self._description(name, base, self._document.options.gravity, self._reading.notes)
-        return replace(content, actuators=actuators, contact_filter=contact_filter)
+        return replace(
+            content, actuators=actuators, contact_filter=contact_filter, configurations=configurations
+        )
 
     def read_trees(self) -> MjcfTrees:
         root = self._document.root
@@ -275,7 +289,8 @@ class _TreeReader:
             description = self._description(first.name, "floating" if free else "fixed", gravity, [])
             if not free and not first.jointed:
                 description = replace(description, base_pose=Pose.from_matrix(first.T_world_body))
-            found.append(MjcfTree(description, tuple(parts.bodies), free, tuple(parts.positions)))
+            positions = tuple(parts.positions)
+            found.append(MjcfTree(description, tuple(parts.bodies), free, positions, parts.aligned))
         self._require_joints_of_motors(root)
         self._note_counts(root)
         return MjcfTrees(
@@ -442,6 +457,7 @@ class _TreeReader:
         by_file = "true" if self._document.compiler_of(joint).align_free else "false"
         align = self._reading.choice(joint, "align", "a free joint", ("auto", "true", "false"), "auto")
         if (by_file if align == "auto" else align) == "true":
+            self._parts.aligned = True
             self._reading.note(
                 joint,
                 f"align: the frame of body {shown(body.name)} is that of the file; MuJoCo moves it to the "
@@ -730,6 +746,33 @@ class _TreeReader:
             )
         return taken
 
+    def _read_configurations(self, base: Base) -> tuple[NamedConfiguration, ...]:
+        """Return the keyframes of the robot, with a note on what they state besides its positions."""
+        keyframes, parts = read_keyframes(self._document), self._parts
+        T_world_free = parts.bodies[0].T_world_body if base == "floating" else None
+        if keyframes and parts.aligned:
+            self._reading.note(
+                next(iter(keyframes.values())),
+                f"not read: {_counted(len(keyframes), 'element')} of <keyframe>, which state the pose of the "
+                "principal axes",
+            )
+            return ()
+        coordinates = _coordinates(T_world_free, parts.positions, parts.joints)
+        found = []
+        for name, key in keyframes.items():
+            (state,) = tree_states(self._document, [coordinates], key, name)
+            found.append(state.configuration(name, key.line))
+        others = [
+            (each, key) for key in keyframes.values() for each in NOT_OF_A_POSITION if each in key.attributes
+        ]
+        if others:
+            self._reading.note(
+                others[0][1],
+                f"not read of <keyframe>: {', '.join(dict.fromkeys(each for each, _ in others))}; "
+                "model.configurations has positions alone",
+            )
+        return tuple(found)
+
     def _contact_filter(self) -> ContactFilter:
         """Return which shapes may touch, with a note on what is no part of the robot."""
         found, left = self._contacts.of_robot(self._link_of, self._colliding)
@@ -903,6 +946,16 @@ class _TreeReader:
             effect = _NOT_READ_OF_BODIES[kind]
             self._reading.note(element, f"{kind} of {what}{more} is not read: {effect}")
         self._reading.note_ignored()
+
+
+def _coordinates(
+    T_world_free: Floats | None, positions: Iterable[tuple[str, float]], joints: Iterable[Joint]
+) -> TreeCoordinates:
+    balls = {joint.name for joint in joints if joint.type == "ball"}
+    return TreeCoordinates(
+        T_world_free,
+        tuple((name, (0.0, 0.0, 0.0, 1.0) if name in balls else (start,)) for name, start in positions),
+    )
 
 
 def _couples_mimic(element: Element) -> bool:

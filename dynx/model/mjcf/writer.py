@@ -21,7 +21,7 @@ import numpy as np
 
 from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, UnsupportedFeatureError, shown
-from dynx.model.elements import IDENTITY, ZERO, Inertial, Joint, Limits, Link, Pose
+from dynx.model.elements import IDENTITY, ZERO, Inertial, Joint, Limits, Link, Mimic, Pose
 from dynx.model.geometry import (
     Appearance,
     Collision,
@@ -53,6 +53,7 @@ from dynx.model.urdf.writer import listed, note_of_kind
 from dynx.model.xml.reading import MAX_DEPTH as MAX_ELEMENT_DEPTH
 from dynx.model.xml.several_files import free_name
 from dynx.model.xml.values import name_fault
+from dynx.spatial.scalar import Floats
 
 WORLD = "world"
 """MJCF's name of the body that does not move."""
@@ -139,6 +140,7 @@ class RobotWriter:
             for each in tree.actuators:
                 if each.joint not in moving:
                     _add(self._kinds, "Actuators on joints that do not move are left out", each.joint)
+        self._add_keyframes(SubElement(root, "keyframe"))
         self._extension.write(root)
         for empty in [
             part for part in root if len(part) == 0 and not part.attrib and part.tag != "worldbody"
@@ -305,6 +307,22 @@ class RobotWriter:
         elif effort > 0.0:
             given = {"ctrlrange": text((-effort, effort))} if effort < UNLIMITED else {}
             SubElement(self._actuator, "motor", {"name": joint.name, "joint": joint.name} | given)
+
+    def _add_keyframes(self, section: Element) -> None:
+        """Add the named configurations, in the order of MuJoCo's joints, which is that of the tree."""
+        tree = self._tree
+        for name, q in tree.configurations.items():
+            numbers = [*q[:3], *_wxyz(q[3:7])] if tree.floating else []
+            for joint in tree.joints:
+                if not joint.moves:
+                    continue
+                coupling = joint.mimic or Mimic(joint.name)
+                first = tree.position_index(coupling.joint)
+                if joint.type == "ball":
+                    numbers += _wxyz(q[first : first + 4])
+                else:
+                    numbers.append(coupling.multiplier * q[first] + coupling.offset)
+            SubElement(section, "key", name=_checked_name(name), qpos=text(numbers))
 
     # -- shapes ---------------------------------------------------------------------------------
 
@@ -588,6 +606,11 @@ def _refuse_nan(joint: Joint) -> None:
     for value in (limits.lower, limits.upper, limits.velocity, limits.effort):
         if math.isnan(value):
             raise DescriptionError(f"a limit of joint {shown(joint.name)} is NaN, which MJCF cannot express")
+
+
+def _wxyz(quat_xyzw: Floats) -> list[float]:
+    x, y, z, w = quat_xyzw.tolist()
+    return [w, x, y, z]
 
 
 def _checked_name(name: str) -> str:

@@ -223,12 +223,15 @@ def urdf_notes(tree: Tree) -> Iterator[str]:
 
 
 def notes_of_open_parts(tree: Tree, language: str) -> Iterator[str]:
-    """Yield notes on actuators and contacts of a robot, which a format leaves open."""
+    """Yield notes on actuators, contacts and configurations of a robot, which a format leaves open."""
     if tree.actuators:
         joints = dict.fromkeys(each.joint for each in tree.actuators)
         yield f"{language} has no actuators of a robot; those of some joints are left out ({listed(joints)})."
     if tree.contact_filter is not None and tree.contact_filter.restricts:
         yield f"{language} does not state which shapes may touch; what the robot's file states is left out."
+    if tree.configurations:
+        names = listed(tree.configurations)
+        yield f"{language} has no named configurations; those of the robot are left out ({names})."
 
 
 def note_of_kind(kind: str, names: Sequence[str]) -> str:

@@ -15,16 +15,18 @@ import numpy as np
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model.ball_joints import refuse_ball_joints
-from dynx.model.elements import Inertial, Mimic, Note, Pose, Vector
+from dynx.model.elements import Inertial, Mimic, NamedConfiguration, Note, Pose, Vector
 from dynx.model.geometry import LinkGeometry
 from dynx.model.loading import build_described
+from dynx.model.mjcf.keyframes import TreeState, position_and_quaternion, read_keyframes, tree_states
 from dynx.model.mjcf.reader import MjcfBody, MjcfTree, MjcfTrees, read_trees
 from dynx.model.mjcf.shapes import Geom
+from dynx.model.named_configurations import coordinates_of
 from dynx.model.package_search import StrPath
 from dynx.model.xml.reading import Element
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
-from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
+from dynx.spatial.so3 import rotation_from_quat
 from dynx.world.scene.bodies import Constraint, PointToPoint, SceneBody, Weld
 from dynx.world.scene.exported_trees import as_exported
 from dynx.world.scene.filters import CollisionFilter
@@ -76,6 +78,7 @@ class _SceneReader:
         self._joint_owners: dict[str, int] = {}
         self._kept: dict[str, str] = {}
         self._without_shapes = 0
+        self._keys = read_keyframes(trees.document)
 
     def scene(self) -> Scene:
         trees, reading = self._trees, self._reading
@@ -84,12 +87,14 @@ class _SceneReader:
                 refuse_ball_joints(build_described(tree.description, self._source), "a scene")
         equalities = list(self._equalities())
         exported = [as_exported(tree) for tree in trees.trees]
-        states = _states(trees, exported, self._keyframe)
+        keyframes = self._states_of_keyframes(exported)
+        states = self._states(exported) if self._keyframe is None else keyframes[self._keyframe]
         couplings = self._couplings(equalities, exported)
         for geom in trees.world:
             self._add_fixed("ground" if geom.type == "plane" else "geom", None, np.eye(4), [geom])
         for number, (tree, renamed) in enumerate(zip(trees.trees, exported, strict=True)):
-            self._add_tree(renamed, couplings[number], states[number])
+            named = [found[number].configuration(name) for name, found in keyframes.items()]
+            self._add_tree(renamed, couplings[number], states[number], named)
             self._place_dropped(tree)
         if self._without_shapes:
             reading.note(
@@ -129,7 +134,13 @@ class _SceneReader:
 
     # -- robots and bodies ----------------------------------------------------------------------
 
-    def _add_tree(self, tree: MjcfTree, couplings: dict[str, Mimic], start: _TreeState) -> None:
+    def _add_tree(
+        self,
+        tree: MjcfTree,
+        couplings: dict[str, Mimic],
+        start: TreeState,
+        named: Sequence[NamedConfiguration],
+    ) -> None:
         moving = any(joint.moves for joint in tree.description.joints)
         if not (moving or tree.free):
             for body in tree.bodies:
@@ -137,7 +148,7 @@ class _SceneReader:
         elif tree.free and len(tree.bodies) == 1 and any(geom.collides for geom in tree.first.geoms):
             self._add_free(tree, start)
         else:
-            self._add_robot(tree, couplings, start)
+            self._add_robot(tree, couplings, start, named)
 
     def _add_fixed(
         self, name: str, body: MjcfBody | None, T_world_body: Floats, geoms: Sequence[Geom]
@@ -166,7 +177,7 @@ class _SceneReader:
                 self._places[original.name] = _BodyPlace(part, np.eye(4))
             self._add_body(collider, Pose.from_matrix(T_world_body), drawn, None, (0.0,) * 6)
 
-    def _add_free(self, tree: MjcfTree, start: _TreeState) -> None:
+    def _add_free(self, tree: MjcfTree, start: TreeState) -> None:
         body, description = tree.first, tree.description
         original = self._originals[id(body.element)]
         part = self._free_name(body.name, self._taken)
@@ -174,7 +185,8 @@ class _SceneReader:
         touching = tuple(geom for geom in body.geoms if geom.collides)
         drawn = [geom for geom in body.geoms if not geom.collides]
         inertial = description.links[0].inertial or Inertial()
-        pose = Pose.from_matrix(start.T_world_base)
+        assert start.T_world_free is not None
+        pose = Pose.from_matrix(start.T_world_free)
         self._add_body(MjcfCollider(part, original, touching), pose, drawn, inertial, start.twist.tolist())
 
     def _add_body(
@@ -231,30 +243,30 @@ class _SceneReader:
         self._bodies.append(made)
         self._colliders.append(collider)
 
-    def _add_robot(self, tree: MjcfTree, couplings: dict[str, Mimic], start: _TreeState) -> None:
+    def _add_robot(
+        self,
+        tree: MjcfTree,
+        couplings: dict[str, Mimic],
+        start: TreeState,
+        named: Sequence[NamedConfiguration],
+    ) -> None:
         content = tree.description
         name = self._free_name(content.name or "robot", self._taken)
         joints = [
             replace(joint, mimic=couplings[joint.name]) if joint.name in couplings else joint
             for joint in content.joints
         ]
-        model = build_described(replace(content, name=name, joints=joints), self._source)
-        q = model.neutral()
-        if tree.free:
-            T = start.T_world_base
-            q[:3], q[3:7] = T[:3, 3], quat_from_rotation(T[:3, :3])
+        content = replace(content, name=name, joints=joints, configurations=tuple(named))
+        model = build_described(content, self._source)
+        q = coordinates_of(model, start.configuration("start"))
         own = set(model.joint_names)
-        shift = model.nq - model.nv
-        for joint, position in start.positions.items():
-            if joint in own:
-                q[model.coordinate_index(joint) + shift] = position
         v = np.zeros(model.nv)
         if tree.free:
             R = rotation_from_quat(q[3:7])
             v[:3], v[3:6] = R.T @ start.twist[:3], R.T @ start.twist[3:]
         for joint, speed in start.speeds.items():
             if joint in own:
-                v[model.coordinate_index(joint)] = speed
+                (v[model.coordinate_index(joint)],) = speed
         materials = {}
         found: list[MjcfCollider] = []
         for body in tree.bodies:
@@ -431,12 +443,50 @@ class _SceneReader:
     def _is_fixed(self, part: str) -> bool:
         return part == WORLD or CollisionFilter(self._robots, self._bodies, []).is_fixed(part)
 
+    # -- keyframes ------------------------------------------------------------------------------
+
+    def _states_of_keyframes(self, exported: Sequence[MjcfTree]) -> dict[str, list[TreeState]]:
+        """Return the states of the trees at each keyframe.
+
+        Keyframes of free bodies that MuJoCo aligns with their principal axes have a note instead, and an
+        error where the scene starts at one. Raises UnknownNameError for the start at no keyframe.
+        """
+        keys, reading = self._keys, self._reading
+        start = self._keyframe
+        if start is not None and start not in keys:
+            known = f"; it has {', '.join(map(shown, list(keys)[:5]))}" if keys else "; it has none"
+            raise UnknownNameError(
+                f"{reading.source}: no keyframe {shown(start)}{nearest(start, keys) or known}"
+            )
+        aligned = [tree.first for tree in self._trees.trees if tree.aligned]
+        if keys and aligned:
+            reason = (
+                f"the free joint of body {shown(aligned[0].name)} is aligned with principal axes, for which "
+                "dynx does not read"
+            )
+            if start is not None:
+                raise reading.unsupported(aligned[0].element, f"{reason} keyframe {shown(start)}")
+            reading.note(aligned[0].element, f"{reason} keyframes")
+            return {}
+        for attribute in ("act", "ctrl", "mpos", "mquat"):
+            if start is not None and attribute in keys[start].attributes:
+                reading.note(keys[start], f"{attribute} of keyframe {shown(start)} is not read")
+        return {name: self._states(exported, key, name) for name, key in keys.items()}
+
+    def _states(
+        self, exported: Sequence[MjcfTree], key: Element | None = None, name: str = ""
+    ) -> list[TreeState]:
+        """Return the state of each tree at a keyframe; None for `qpos0`, at rest."""
+        trees = self._trees.trees
+        states = tree_states(self._document, [tree.coordinates for tree in trees], key, name)
+        return [_exported_state(*each) for each in zip(states, trees, exported, strict=True)]
+
     def _note_keyframes(self) -> None:
-        keys = [each for each in self._document.sections("keyframe") if each.tag == "key"]
-        if keys and self._keyframe is None:
-            names = ", ".join(shown(each.attributes.get("name", "")) for each in keys[:5])
+        if self._keys and self._keyframe is None:
+            names = ", ".join(map(shown, list(self._keys)[:5]))
             self._reading.note(
-                keys[0], f"the scene starts at qpos0; keyframe=... starts it at one of the file's: {names}"
+                next(iter(self._keys.values())),
+                f"the scene starts at qpos0; keyframe=... starts it at one of the file's: {names}",
             )
 
 
@@ -452,93 +502,18 @@ def _counted(count: int, one: str, several: str) -> str:
     return f"{count} {one if count == 1 else several}"
 
 
-# -- keyframes --------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _TreeState:
-    """State of a tree at the start: pose (4, 4) and twist (6,) of its first body, in world axes, and the
-    positions and velocities of its joints by name."""
-
-    T_world_base: Floats
-    twist: Floats
-    positions: dict[str, float]
-    speeds: dict[str, float]
-
-
-def _refuse_aligned(trees: MjcfTrees, what: str) -> None:
-    """Raise UnsupportedFeatureError for a free joint whose coordinates are those of the principal axes."""
-    reading, root = trees.document.reading, trees.document.root
-    default = any(each.attributes.get("alignfree") == "true" for each in root.all("compiler"))
-    for tree in trees.trees:
-        for element in tree.first.element.children if tree.free else ():
-            aligned = element.attributes.get("align", "auto")
-            if element.tag == "freejoint" and (aligned == "true" or (aligned == "auto" and default)):
-                raise reading.unsupported(
-                    element,
-                    f"the free joint of body {shown(tree.first.name)} is aligned with principal axes, for "
-                    f"which dynx does not read {what}",
-                )
-
-
-def _states(trees: MjcfTrees, exported: Sequence[MjcfTree], keyframe: str | None) -> list[_TreeState]:
-    """Return the state of each tree at a keyframe; None for `qpos0`, at rest.
-
-    Raises UnknownNameError for the name of no keyframe, DescriptionError for one with another count of
-    numbers.
-    """
-    q0: list[float] = []
-    for tree in trees.trees:
-        if tree.free:
-            T = tree.first.T_world_body
-            x, y, z, w = quat_from_rotation(T[:3, :3]).tolist()
-            q0 += [*T[:3, 3].tolist(), w, x, y, z]
-        q0 += [position for _, position in tree.positions]
-    nv = sum(6 * tree.free + len(tree.positions) for tree in trees.trees)
-    q, v = np.array(q0), np.zeros(nv)
-    if keyframe is not None:
-        reading = trees.document.reading
-        keys = [each for each in trees.document.sections("keyframe") if each.tag == "key"]
-        named = {each.attributes.get("name", ""): each for each in keys}
-        if keyframe not in named:
-            known = f"; it has {', '.join(map(shown, list(named)[:5]))}" if named else "; it has none"
-            raise UnknownNameError(
-                f"{reading.source}: no keyframe {shown(keyframe)}{nearest(keyframe, named) or known}"
-            )
-        element, what = named[keyframe], f"keyframe {shown(keyframe)}"
-        if "qpos" in element.attributes:
-            q = np.array(reading.some_numbers(element, "qpos", what, len(q0), len(q0)))
-        if "qvel" in element.attributes:
-            v = np.array(reading.some_numbers(element, "qvel", what, nv, nv))
-        _refuse_aligned(trees, what)
-        for attribute in ("act", "ctrl", "mpos", "mquat"):
-            if attribute in element.attributes:
-                reading.note(element, f"{attribute} of {what} is not read")
-    found, at, at_v = [], 0, 0
-    for tree, renamed in zip(trees.trees, exported, strict=True):
-        T, twist = renamed.first.T_world_body, np.zeros(6)
-        if tree.free:
-            w, x, y, z = q[at + 3 : at + 7]
-            norm = float(np.linalg.norm(q[at + 3 : at + 7]))
-            T_first = np.asarray(
-                homogeneous(rotation_from_quat(np.array([x, y, z, w]) / norm), q[at : at + 3])
-                if norm > 0.0
-                else homogeneous(np.eye(3), q[at : at + 3])
-            )
-            T = T_first @ inverse(tree.first.T_world_body) @ renamed.first.T_world_body
-            omega = T_first[:3, :3] @ v[at_v + 3 : at_v + 6]
-            arm = T[:3, 3] - T_first[:3, 3]
-            twist = np.concatenate([v[at_v : at_v + 3] + np.cross(omega, arm), omega])
-            at, at_v = at + 7, at_v + 6
-        names = [name for name, _ in renamed.positions]
-        count = len(names)
-        found.append(
-            _TreeState(
-                T,
-                twist,
-                dict(zip(names, q[at : at + count].tolist(), strict=True)),
-                dict(zip(names, v[at_v : at_v + count].tolist(), strict=True)),
-            )
-        )
-        at, at_v = at + count, at_v + count
-    return found
+def _exported_state(state: TreeState, tree: MjcfTree, renamed: MjcfTree) -> TreeState:
+    """Return the state of a tree in the names, and for the first body, that `as_exported` gave it."""
+    names = dict(zip(state.positions, (name for name, _ in renamed.positions), strict=True))
+    base, twist, T_first = state.base, state.twist, state.T_world_free
+    if T_first is not None and renamed is not tree:
+        T = T_first @ inverse(tree.first.T_world_body) @ renamed.first.T_world_body
+        arm = T[:3, 3] - T_first[:3, 3]
+        base = position_and_quaternion(T)
+        twist = np.concatenate([twist[:3] + np.cross(twist[3:], arm), twist[3:]])
+    return TreeState(
+        base,
+        twist,
+        {names[joint]: position for joint, position in state.positions.items()},
+        {names[joint]: speed for joint, speed in state.speeds.items()},
+    )

@@ -581,3 +581,37 @@ def test_a_search_that_is_stopped_by_its_timeout_says_so() -> None:
     assert (found["success"], found["status"]) == (False, "TIMED_OUT")
     refused = CliRunner().invoke(cli, ["ik", "ur5", *target, "--timeout", "0"])
     assert refused.exit_code == 2
+
+
+KEYED = """<mujoco model="arm">
+  <worldbody><body name="b"><joint name="j" ref="0"/><geom size="0.1" pos="1 0 0"/></body></worldbody>
+  <keyframe><key name="home" qpos="0.5"/><key name="far out" qpos="-0.25"/></keyframe>
+</mujoco>"""
+
+
+def test_configurations_of_the_file_are_shown_and_taken_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(KEYED)
+    assert document("info", str(path))["configurations"] == {"home": [0.5], "far out": [-0.25]}
+    shown = CliRunner().invoke(cli, ["info", str(path)])
+    assert "named configurations: home, far out" in shown.stdout
+    for name, q in (("home", "0.5"), ("far out", "-0.25")):
+        assert document("fk", str(path), "--q", name) == document("fk", str(path), "--q", q)
+    moved = document("sim", str(path), "--from", "home", "--to", "far out", "--duration", "0.1")
+    assert (moved["motion"]["from"], moved["motion"]["to"]) == ([0.5], [-0.25])
+
+
+@pytest.mark.parametrize(
+    ("robot", "q", "message"),
+    [
+        ("arm.xml", "hom", "--q: no configuration 'hom' of arm; did you mean 'home'"),
+        ("ur5", "home", "its description has none; wanted numbers"),
+        ("ur5", "nan", "'nan' is not finite"),
+        ("ur5", "1;2", "'1;2' is not a number"),
+    ],
+)
+def test_other_names_of_configurations_are_refused(tmp_path: Path, robot: str, q: str, message: str) -> None:
+    (tmp_path / "arm.xml").write_text(KEYED)
+    result = CliRunner().invoke(cli, ["fk", robot if robot == "ur5" else str(tmp_path / robot), "--q", q])
+    assert result.exit_code == 2
+    assert message in " ".join(result.stderr.split())

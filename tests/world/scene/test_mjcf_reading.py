@@ -444,9 +444,20 @@ def test_another_keyframe_is_refused(tmp_path: Path) -> None:
         read_scene(file, keyframe="hone")
     with pytest.raises(ArgumentError, match="keyframe"):
         read_scene("stack", keyframe="home")
-    short = KEYS.replace('qpos="0.5 1', 'qpos="1')
     with pytest.raises(DescriptionError, match="qpos"):
-        read(short, "home")
+        read(KEYS.replace('qpos="0.5', 'qpos="1 0.5'))
+
+
+def test_robots_of_a_scene_have_the_keyframes_as_configurations() -> None:
+    model = read(KEYS).robot("arm").model
+    assert {name: q.tolist() for name, q in model.configurations.items()} == {"home": [0.5]}
+
+
+def test_keyframes_of_an_aligned_free_body_are_named() -> None:
+    aligned = KEYS.replace("<freejoint/>", '<freejoint align="true"/>')
+    assert any("does not read keyframes" in note.message for note in read(aligned).notes)
+    with pytest.raises(UnsupportedFeatureError, match="keyframe 'home'"):
+        read(aligned, "home")
 
 
 # -- what a scene cannot say ------------------------------------------------------------------------
