@@ -19,7 +19,6 @@ from dynx.backends import Backend, backend
 from dynx.backends.dynamics import Dynamics, EngineDynamics
 from dynx.control.content import attributes_of, content_of, fields_of
 from dynx.errors import ArgumentError, DTypeError, ShapeError, UnsupportedFeatureError, shown
-from dynx.files.pages import html_grid
 from dynx.model import Model
 from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import JointCoefficients
@@ -185,6 +184,8 @@ class Controller(ABC, Generic[ControllerState]):
 
     def _repr_html_(self) -> str:
         title, *parts = repr(self)[1:-1].split(", ")
+        from dynx.files.pages import html_grid  # most are shown on no page
+
         return html_grid(title, (), ([part] for part in parts))
 
 

@@ -7,6 +7,7 @@ robots are compared, not conventions.
 
 from typing import TYPE_CHECKING
 
+from dynx.loaded.order import EngineOrder
 from dynx.loaded.registry import (
     COMMON_VARIANTS,
     ENGINES,
@@ -16,13 +17,23 @@ from dynx.loaded.registry import (
     load_as,
     loader_class,
 )
-from dynx.loaded.robot import LoadedInertial, LoadedJoint, LoadedModel, LoadedRobot
+from dynx.loaded.robot import (
+    EngineBase,
+    EngineCoordinates,
+    LoadedInertial,
+    LoadedJoint,
+    LoadedModel,
+    LoadedRobot,
+)
 from dynx.registry import moved_names
 
 __all__ = [
     "COMMON_VARIANTS",
     "ENGINES",
     "VARIANTS",
+    "EngineBase",
+    "EngineCoordinates",
+    "EngineOrder",
     "LoadedInertial",
     "LoadedJoint",
     "LoadedModel",

@@ -72,6 +72,39 @@ class LoadedModel:
     remarks: tuple[str, ...] = field(default=())
 
 
+@dataclass(frozen=True, eq=False)
+class EngineBase:
+    """The coordinates of a floating base in those of an engine."""
+
+    q: tuple[int, ...]
+    """Index of the entries of dynx: position x, y, z, then quaternion x, y, z, w."""
+    v: tuple[int, ...]
+    """Index of the entries of dynx: linear, then angular velocity."""
+    linear_in_world: bool
+    """True if the linear velocity is in axes of the world, False in those of the base."""
+    angular_in_world: bool
+    """True if the angular velocity is in axes of the world, False in those of the base."""
+    T_base_frame: Floats = field(default_factory=lambda: np.eye(4))
+    """Pose (4, 4) of the frame of which these are position and velocity, in that of dynx."""
+
+
+@dataclass(frozen=True, eq=False)
+class EngineCoordinates:
+    """Where an engine has the joints of a model in its q and v."""
+
+    neutral: Floats
+    """The q of the engine with all joints at 0."""
+    n_velocities: int
+    """Length of the v of the engine."""
+    joints_q: tuple[int, ...]
+    """Index in q of each joint, in the order of `Model.joint_names`."""
+    joints_v: tuple[int, ...]
+    """Index in v of each joint."""
+    circles: tuple[bool, ...]
+    """Whether q has the cosine and sine of the angle of each joint."""
+    base: EngineBase | None = None
+
+
 Self = TypeVar("Self", bound="LoadedRobot")
 
 
@@ -135,6 +168,10 @@ class LoadedRobot(ABC):
     @abstractmethod
     def describe(self) -> LoadedModel:
         """Return the model that the engine holds."""
+
+    def coordinates(self) -> EngineCoordinates:
+        """Return where the engine has the joints of the model; EngineError where it does not say."""
+        raise UnusableEngineError(f"{self.name} does not say in which order it has its coordinates")
 
     @abstractmethod
     def link_poses(self, q: Floats) -> Floats:

@@ -123,6 +123,12 @@ class Model(Tree):
         """Return the robot as SDF text, Gazebo's format, as `to_mjcf` does."""
         raise NotImplementedError
 
+    @door("dynx.loaded.order:order_of")
+    def order_of(self, engine: str) -> Any:
+        """Return the `dynx.loaded.EngineOrder`: the order of q and v in an engine that loads the file itself,
+        such as ``"mujoco"``."""
+        raise NotImplementedError
+
     @cached_property
     def extended_mechanism(self) -> Mechanism:
         """`mechanism` with its inertias merged in extended precision (`dynx.spatial.scalar`)."""

@@ -14,7 +14,6 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import SCHEMA_ENTRY, read_arrays, write_arrays
 from dynx.files.figures import new_figure, save_figure
-from dynx.files.pages import html_table
 from dynx.model import Model
 from dynx.model.numbers import checked_entries, real_array
 from dynx.rbd.jacobians import LOCAL
@@ -211,6 +210,8 @@ class BatchRollouts:
             "diverged": self._losses.removeprefix(", ") or "none",
             "largest error [rad or m], 5 %, 50 %, 95 %": f"{low}, {middle}, {high}",
         }
+        from dynx.files.pages import html_table  # most are shown on no page
+
         return html_table(f"rollouts of {self.scenario.model.name}", rows)
 
 

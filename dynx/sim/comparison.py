@@ -15,7 +15,6 @@ import numpy as np
 
 from dynx.control.base import Controller, chain_of
 from dynx.errors import ArgumentError, DynxError, shown
-from dynx.files.pages import html_grid
 from dynx.model import Model
 from dynx.model.elements import Inertial
 from dynx.model.geometry.links import Collision
@@ -562,6 +561,8 @@ class RolloutComparison:
             )
             for each in self.causes
         )
+        from dynx.files.pages import html_grid  # most are shown on no page
+
         return html_grid(repr(self)[1:-1], ("difference", "ours", "theirs", "alone", "without it"), rows)
 
 

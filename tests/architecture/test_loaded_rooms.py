@@ -58,7 +58,7 @@ FLOWS = {
             "viewer",
         ),
         (),
-        71,
+        67,
         11960,
     ),
     "inverse kinematics": Flow(

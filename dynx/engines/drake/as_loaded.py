@@ -40,6 +40,8 @@ from dynx.engines.drake.library import (
 from dynx.errors import EngineError, ModelError, UnusableEngineError, located, shown
 from dynx.files.reading import read_file
 from dynx.loaded.robot import (
+    EngineBase,
+    EngineCoordinates,
     LoadedInertial,
     LoadedJoint,
     LoadedModel,
@@ -340,7 +342,16 @@ class LoadedDrake(LoadedRobot):
             set_in_context(self._context, self._bodies, model, calls)
             self._forces = MultibodyForces(plant)
         self._remarks = remarks(log, str(path), plant)
-        self._coordinates = self._find_coordinates()
+        self._places = self._find_coordinates()
+        base = self._places.base
+        first = None if base is None else (base.q[-1], base.v[3])
+        self._coordinates = DrakeCoordinates(
+            self._places.joints_q,
+            self._places.joints_v,
+            plant.num_positions(),
+            plant.num_velocities(),
+            first,
+        )
         self._torque = plant.get_applied_generalized_force_input_port()
         self._acceleration = plant.get_generalized_acceleration_output_port()
 
@@ -492,8 +503,12 @@ class LoadedDrake(LoadedRobot):
         _, _, nested = str(self._plant.GetModelInstanceName(part.model_instance())).partition("::")
         return f"{nested}::{part.name()}" if nested else str(part.name())
 
-    def _find_coordinates(self) -> DrakeCoordinates:
-        """Return the map between the coordinates of dynx and those of the plant."""
+    def coordinates(self) -> EngineCoordinates:
+        """Return the places of the joints in the q and v of the plant."""
+        return self._places
+
+    def _find_coordinates(self) -> EngineCoordinates:
+        """Return the places of the joints of the model in the q and v of the plant."""
         plant, model = self._plant, self._model
         wanted = [self._joints.get(name) for name in model.joint_names]
         wrong = {
@@ -513,13 +528,19 @@ class LoadedDrake(LoadedRobot):
             raise lacking_joints(self.name, model, wrong)
         if model.floating and floating is None:
             raise UnusableEngineError(f"drake does not let the base of {model.name} float")
-        base = None if floating is None else (floating.position_start(), floating.velocity_start())
+        base, neutral = None, np.zeros(plant.num_positions())
+        if floating is not None:
+            at_q, at_v = int(floating.position_start()), int(floating.velocity_start())
+            neutral[at_q] = 1.0
+            q = tuple(at_q + k for k in (4, 5, 6, 1, 2, 3, 0))
+            base = EngineBase(q, tuple(at_v + k for k in (3, 4, 5, 0, 1, 2)), True, True)
         joints = [joint for joint in wanted if joint is not None]
-        return DrakeCoordinates(
-            [joint.position_start() for joint in joints],
-            [joint.velocity_start() for joint in joints],
-            plant.num_positions(),
-            plant.num_velocities(),
+        return EngineCoordinates(
+            neutral,
+            int(plant.num_velocities()),
+            tuple(int(joint.position_start()) for joint in joints),
+            tuple(int(joint.velocity_start()) for joint in joints),
+            (False,) * len(joints),
             base,
         )
 

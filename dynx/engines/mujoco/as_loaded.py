@@ -27,6 +27,8 @@ from dynx.engines.mujoco.library import MAX_DEPTH, mujoco, silence_warnings
 from dynx.engines.silence import silence
 from dynx.errors import EngineError, UnusableEngineError, nonblank_lines, shown
 from dynx.loaded.robot import (
+    EngineBase,
+    EngineCoordinates,
     LoadedInertial,
     LoadedJoint,
     LoadedModel,
@@ -437,6 +439,19 @@ class LoadedMujoco(LoadedRobot):
         """Release MuJoCo's model and data."""
         vars(self).pop("_data", None)
         vars(self).pop("_loaded", None)
+
+    def coordinates(self) -> EngineCoordinates:
+        """Return the addresses of the joints in `qpos` and `qvel`."""
+        loaded, floating = self._loaded, self._model.floating
+        neutral = np.array(loaded.qpos0)
+        single = [int(kind) for kind in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)]
+        neutral[loaded.jnt_qposadr[np.isin(loaded.jnt_type, single)]] = 0.0
+        if floating:
+            neutral[:7] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+        base = EngineBase((0, 1, 2, 4, 5, 6, 3), tuple(range(6)), True, False) if floating else None
+        joints_v = self._v[6:] if floating else self._v
+        circles = (False,) * len(self._q)
+        return EngineCoordinates(neutral, int(loaded.nv), tuple(self._q), tuple(joints_v), circles, base)
 
     # -- from dynx to MuJoCo ------------------------------------------------------------------
 

@@ -22,6 +22,8 @@ from dynx.engines.pinocchio.library import pin
 from dynx.engines.silence import capture_output
 from dynx.errors import EngineError, UnusableEngineError, nonblank_lines
 from dynx.loaded.robot import (
+    EngineBase,
+    EngineCoordinates,
     LoadedInertial,
     LoadedJoint,
     LoadedModel,
@@ -310,6 +312,18 @@ class LoadedPinocchio(LoadedRobot):
         if wrong:
             raise lacking_joints(self.name, self._model, wrong)
         return [known[name] for name in names]
+
+    def coordinates(self) -> EngineCoordinates:
+        """Return the places of the joints in the engine's q and v; angles without limits are circles."""
+        base = EngineBase(tuple(range(7)), tuple(range(6)), False, False) if self._model.floating else None
+        return EngineCoordinates(
+            self._neutral,
+            int(self._engine.nv),
+            tuple(int(joint.idx_q) for joint in self._joints),
+            tuple(int(joint.idx_v) for joint in self._joints),
+            tuple(joint.nq == 2 for joint in self._joints),
+            base,
+        )
 
     def _configuration(self, q: Floats) -> Floats:
         x: Floats = self._neutral.copy()

@@ -39,6 +39,8 @@ from dynx.engines.pybullet.file_checks import require_harmless
 from dynx.engines.pybullet.library import bullet
 from dynx.errors import UnusableEngineError, shown
 from dynx.loaded.robot import (
+    EngineBase,
+    EngineCoordinates,
     LoadedInertial,
     LoadedJoint,
     LoadedModel,
@@ -478,6 +480,18 @@ class LoadedPyBullet(LoadedRobot):
             raise lacking_joints(self.name, self._model, instead)
         place = {_text(client.joints[k][1]): n for n, k in enumerate(client.moving)}
         return [place[name] for name in names]
+
+    def coordinates(self) -> EngineCoordinates:
+        """Return the numbers of the joints among those that are not fixed, after the inertial frame of a
+        floating base."""
+        in_q, in_v = (7, 6) if self._model.floating else (0, 0)
+        n = len(self._client.moving)
+        neutral, base = np.zeros(in_q + n), None
+        if self._model.floating:
+            neutral[6] = 1.0
+            base = EngineBase(tuple(range(7)), tuple(range(6)), True, True, self._T_base_C)
+        joints_q, joints_v = (tuple(first + k for k in self._order) for first in (in_q, in_v))
+        return EngineCoordinates(neutral, in_v + n, joints_q, joints_v, (False,) * len(self._order), base)
 
     @property
     def _has_coordinates(self) -> bool:

@@ -15,7 +15,6 @@ from dynx.argument_types import checks_types
 from dynx.backends import Backend, backend
 from dynx.control.base import Controller
 from dynx.errors import ArgumentError, DynxError, UnsupportedFeatureError
-from dynx.files.pages import html_grid
 from dynx.model import Model
 from dynx.model.numbers import whole_number
 from dynx.rbd.jacobians import LOCAL
@@ -107,6 +106,8 @@ class Summary(NamedTuple):
             (name, unit, *(f"{x:.3g}" for x in numbers))
             for name, unit, *numbers in zip(self.coordinates, self.units, *columns.values(), strict=True)
         )
+        from dynx.files.pages import html_grid  # most are shown on no page
+
         return html_grid(f"{title}: {self}", ("coordinate", "unit", *columns), rows)
 
     def _largest(self, values: Floats, units: Mapping[str, str] | None = None) -> str:

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types, is_listed
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Model, Pose
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.configuration import checked_q, neutral
 from dynx.model.elements import checked_pose
 from dynx.model.model import refuse_other_than_model
@@ -129,7 +128,10 @@ class SceneRobot:
     def __post_init__(self) -> None:
         checked_name("robot", self.name)
         refuse_other_than_model(self.model)
-        refuse_ball_joints(self.model, "a scene")
+        if self.model.ball_joints:
+            from dynx.model.ball_joints import refuse_ball_joints  # most robots have none
+
+            refuse_ball_joints(self.model, "a scene")
         what = f"robot {shown(self.name)}"
         q = checked_q(self.model, neutral(self.model) if self.q is None else self.q, f"q of {what}")
         zero: ArrayLike = [0.0] * self.model.nv
