@@ -30,6 +30,7 @@ from dynx.files.temporary import temporary_folder, writing_in
 from dynx.viewer.first_picture import FIRST_PICTURE
 from dynx.viewer.library import CLIENT
 from dynx.viewer.moving_picture import ALWAYS_WHOLE, COARSE_WHILE_MOVING
+from dynx.viewer.occlusion import NO_OCCLUSION, OCCLUSION
 from dynx.viewer.pose_channel import PLACING
 from dynx.viewer.shading import SHADOWS
 from dynx.world.scenery import ROUGHNESS
@@ -515,6 +516,7 @@ _BEFORE_PICTURES = (
       fade();
       castShadows(renderer, camera);
       layAxesOver();
+      occlude(renderer, drawn, camera);
       // viser draws its background over the whole picture also where there is none.
       const behind = window.__viserMutable.backgroundMaterial;
       if (behind) behind.visible = behind.uniforms.enabled.value;
@@ -630,7 +632,7 @@ class Client:
         """The folder that is served."""
         script = ALWAYS_WHOLE if antialiasing else COARSE_WHILE_MOVING
         script += FIRST_PICTURE + PLACING + _PRESSES + _OWN_COLOURS + _NAMES_ON_HOVER + SHADOWS
-        script += _BEFORE_PICTURES + _INPUT
+        script += (OCCLUSION if antialiasing else NO_OCCLUSION) + _BEFORE_PICTURES + _INPUT
         policy = ContentPolicy("'self' data: blob:")
         self.headers = tuple(policy.headers([HANDLER_HASH]))
         """Headers with which the page is served."""
@@ -673,7 +675,7 @@ def standalone(
     """
     policy = ContentPolicy("data: blob:")
     script = ALWAYS_WHOLE + FIRST_PICTURE + PLACING + _OWN_COLOURS + _NAMES_ON_HOVER + SHADOWS
-    script += _BEFORE_PICTURES
+    script += OCCLUSION + _BEFORE_PICTURES
     page = _guarded(page, script, policy)
     meta = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy.text(), quote=True)}">'
     page = page.replace("<head>", f"<head>{meta}", 1)

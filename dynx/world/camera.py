@@ -31,7 +31,21 @@ from dynx.steppers.camera import Camera, Draw, Drawing, DrawnShape, DrawnTriangl
 from dynx.steppers.state import WorldState
 from dynx.world.boxes import shape_box
 from dynx.world.scene import Scene
-from dynx.world.scenery import GAMMA, KEY_DIRECTION, LIGHT, MATTE, TILE, Scenery, tiles
+from dynx.world.scenery import (
+    GAMMA,
+    KEY_DIRECTION,
+    LEAST_OPENNESS,
+    LIGHT,
+    MATTE,
+    OCCLUSION_REACH,
+    OCCLUSION_SHARE,
+    OCCLUSION_SLOPE,
+    OCCLUSION_STEPS,
+    OCCLUSION_TURNS,
+    TILE,
+    Scenery,
+    tiles,
+)
 
 if TYPE_CHECKING:
     from dynx.model.geometry.mesh_reading import Surface
@@ -413,18 +427,6 @@ _FINE_STEPS = np.array([[x, y] for x in np.linspace(-1.0, 1.0, 7) for y in np.li
 _FINE_STEPS = _FINE_STEPS[np.hypot(*_FINE_STEPS.T) <= 1.1]
 """Places (n, 2) at which it is looked up where not all of the coarse ones agree."""
 
-_OPEN_REACH = 0.12
-"""Distance within which surfaces hide the sky from each other, in radii of the ball around the shapes."""
-
-_OPEN_STEPS = 14
-"""Number of places around a pixel at which surfaces are looked for that hide the sky."""
-
-_OPEN_TURNS = 4
-"""Number of pixels along each side of the squares in which every pixel looks at other places."""
-
-_DARKEST = 0.3
-"""Least share of the sky's light that is left where surfaces hide it."""
-
 _RIM = 0.4
 """Share by which a see-through surface becomes opaque where it is seen along itself: its outline shows."""
 
@@ -483,7 +485,7 @@ def cast_rays_smoothly(
     # An image changes within a pixel.
     varied = np.array([*(_is_varied(each) for each in seen), False])
     edge |= varied[buffer.number[first]]
-    openness = _openness(buffer, first, camera, _OPEN_REACH * _ball(_casting(shapes))[1])
+    openness = _openness(buffer, first, camera, OCCLUSION_REACH * _ball(_casting(shapes))[1])
     shading = _Shading(seen, shapes, T_world_camera, fine, scenery, tile, veils)
     colours = np.empty((len(every), 3))
     colours[~edge] = shading.colours(buffer, first[~edge], openness[~edge])
@@ -553,12 +555,12 @@ def _openness(buffer: DepthBuffer, pixels: Whole, camera: Camera, reach: float) 
         )[:, None]
     )
     column, row = seen % width, seen // width
-    turn = (column % _OPEN_TURNS + _OPEN_TURNS * (row % _OPEN_TURNS)) / _OPEN_TURNS**2
+    turn = (column % OCCLUSION_TURNS + OCCLUSION_TURNS * (row % OCCLUSION_TURNS)) / OCCLUSION_TURNS**2
     radius = np.minimum(radius[seen], 0.25 * height)
     hidden = np.zeros(len(seen))
-    for k in range(_OPEN_STEPS):
+    for k in range(OCCLUSION_STEPS):
         angle = 2.0 * math.pi * (turn + 0.381966 * k)
-        away = radius * ((k + turn + 0.1) / _OPEN_STEPS)
+        away = radius * ((k + turn + 0.1) / OCCLUSION_STEPS)
         other_column = np.clip(np.rint(column + away * np.cos(angle)).astype(np.intp), 0, width - 1)
         other_row = np.clip(np.rint(row + away * np.sin(angle)).astype(np.intp), 0, height - 1)
         other = other_row * width + other_column
@@ -568,8 +570,8 @@ def _openness(buffer: DepthBuffer, pixels: Whole, camera: Camera, reach: float) 
             square = np.einsum("ij,ij->i", between, between)
             height_above = np.einsum("ij,ij->i", between, unit) / np.sqrt(np.maximum(square, 1e-18))
             near = np.maximum(1.0 - square / reach**2, 0.0)
-            hidden += np.where(np.isfinite(far), np.maximum(height_above - 0.12, 0.0) * near, 0.0)
-    lit[seen] = np.maximum(1.0 - 2.2 * hidden / _OPEN_STEPS, _DARKEST)
+            hidden += np.where(np.isfinite(far), np.maximum(height_above - OCCLUSION_SLOPE, 0.0) * near, 0.0)
+    lit[seen] = np.maximum(1.0 - OCCLUSION_SHARE * hidden / OCCLUSION_STEPS, LEAST_OPENNESS)
     return _blurred(lit.reshape(height, width), depth.reshape(height, width), reach).ravel()
 
 
@@ -577,7 +579,7 @@ def _blurred(values: Floats, depth: Floats, reach: float) -> Floats:
     """Return means (h, w) of values over the squares in which pixels look at different places, of surfaces
     at depths that differ by less than half the `reach` [m]."""
     total, count = values.copy(), np.ones_like(values)
-    half = _OPEN_TURNS // 2
+    half = OCCLUSION_TURNS // 2
     for down in range(-half, half):
         for right in range(-half, half):
             if down == 0 and right == 0:

@@ -49,6 +49,25 @@ _SHARPNESS = 2.0 / ROUGHNESS**4 - 2.0
 _SHINE = 0.01 / ROUGHNESS**4
 """Share of the key light in the middle of its highlight, of a surface that mirrors 0.04 of what meets it."""
 
+OCCLUSION_REACH = 0.12
+"""Distance within which surfaces hide the sky from each other, in radii of the ball around the shapes."""
+
+OCCLUSION_STEPS = 14
+"""Number of places around a pixel at which surfaces are looked for that hide the sky."""
+
+OCCLUSION_TURNS = 4
+"""Number of pixels along each side of the squares in which every pixel looks at other places."""
+
+OCCLUSION_SLOPE = 0.12
+"""Sine of the angle above a surface below which another one hides nothing of the sky."""
+
+OCCLUSION_SHARE = 2.2
+"""Share of the sky's light that a surface takes away for each unit of the sine above that, in the mean of the
+places."""
+
+LEAST_OPENNESS = 0.3
+"""Least share of the sky's light that is left where surfaces hide it."""
+
 Colour = tuple[float, float, float]
 Rgba = tuple[float, float, float, float]
 

@@ -26,6 +26,14 @@ SOFTWARE = (
 )
 """Options with which Chromium draws WebGL without a graphics processor."""
 
+AS_IF_ON_A_GRAPHICS_PROCESSOR = """(() => {
+  const getParameter = WebGL2RenderingContext.prototype.getParameter, NAME = 0x9246;
+  WebGL2RenderingContext.prototype.getParameter = function (name) {
+    return name === NAME ? "graphics processor" : getParameter.call(this, name);
+  };
+})();"""
+"""Script by which a page takes the software that draws it for a graphics processor."""
+
 PATIENCE = 180.0
 """Longest wait for the page [s]: software draws slowly beside other tests."""
 
@@ -69,11 +77,16 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def open_page(browser: Any) -> Iterator[Callable[..., Opened]]:
-    """Open addresses, or empty pages, of a width and a height [pixels], which are closed after the test."""
+    """Open addresses, or empty pages, of a width and a height [pixels], which are closed after the test; with
+    `accelerated` they do what they do on a graphics processor."""
     pages = []
 
-    def opened(url: str | None = None, size: tuple[int, int] = (900, 450)) -> Opened:
+    def opened(
+        url: str | None = None, size: tuple[int, int] = (900, 450), *, accelerated: bool = False
+    ) -> Opened:
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        if accelerated:
+            page.add_init_script(AS_IF_ON_A_GRAPHICS_PROCESSOR)
         page.set_default_timeout(1e3 * PATIENCE)
         pages.append(page)
         found = Opened(page)

@@ -57,13 +57,17 @@ def test_pictures_without_light_have_the_colours_of_the_files(name: str) -> None
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", ["duck", "r2d2", "gltf"])
-def test_the_page_without_light_has_the_colours_of_the_files(open_page: OpenPage, name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "accelerated"), [("duck", False), ("r2d2", False), ("gltf", False), ("r2d2", True)]
+)
+def test_the_page_without_light_has_the_colours_of_the_files(
+    open_page: OpenPage, name: str, accelerated: bool
+) -> None:
     subject = subject_of(name)
     pixels, expected = without_edges(subject, pixels_off_edges(subject, SAMPLES))
-    with subject.model.view() as viewer:
+    with subject.model.view(whole_meshes=accelerated) as viewer:
         unlit_page(viewer)
-        page = open_page(viewer.url)
+        page = open_page(viewer.url, accelerated=accelerated)
         page.page.evaluate(MATTE)
         connected(viewer)
         shown = lambda: share_close(by_page(viewer, subject.camera), pixels, expected) >= SHARE  # noqa: E731
