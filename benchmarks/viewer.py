@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 import dynx
 from dynx.viewer.library import CLIENT, serve, silent
-from dynx.viewer.page import DEFAULT_HOST, _free_port
+from dynx.viewer.page import DEFAULT_HOST
 from dynx.viewer.triangles import TRIANGLE_BUDGET
 from tests.viewer.conftest import BROWSERS, SOFTWARE
 
@@ -192,9 +192,8 @@ def triangles_of_robot(name: str) -> int:
 def empty_page(browser: Any, launch: Callable[[], Any] | None) -> float:
     """Return the time in which a page of viser that shows nothing has drawn [s], with the start of a browser
     where `launch` is given."""
-    port = _free_port(DEFAULT_HOST, 0)
     server = serve(
-        DEFAULT_HOST, port, "empty", CLIENT.parent, lambda answer: answer, lambda messages, _: messages
+        DEFAULT_HOST, 0, "empty", CLIENT.parent, lambda answer: answer, lambda messages, _: messages
     )
     try:
         with ExitStack() as ended:
@@ -202,7 +201,7 @@ def empty_page(browser: Any, launch: Callable[[], Any] | None) -> float:
             if launch is not None:
                 browser = ended.enter_context(closing(launch()))
             page = ended.enter_context(page_of(browser, 1))
-            page.goto(f"http://{DEFAULT_HOST}:{port}")
+            page.goto(f"http://{DEFAULT_HOST}:{server.get_port()}")
             return until_drawn(page) - began
     finally:
         with silent():
