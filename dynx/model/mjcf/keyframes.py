@@ -8,8 +8,9 @@ and 0 in `qvel`, as in MuJoCo 4.0.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -43,12 +44,23 @@ class TreeCoordinates:
     T_world_free: Floats | None
     positions: tuple[tuple[str, Numbers], ...]
 
+    @cached_property
+    def initial(self) -> Numbers:
+        """The numbers of `qpos0`."""
+        found: list[float] = []
+        if self.T_world_free is not None:
+            base = position_and_quaternion(self.T_world_free)
+            found += [*base[:3], *_as_wxyz(base[3:])]
+        for _, position in self.positions:
+            found += _as_wxyz(position) if len(position) == 4 else position
+        return tuple(found)
+
     @property
     def n_positions(self) -> int:
         """Number of entries of `qpos`."""
-        return 7 * (self.T_world_free is not None) + sum(len(each) for _, each in self.positions)
+        return len(self.initial)
 
-    @property
+    @cached_property
     def n_rates(self) -> int:
         """Number of entries of `qvel`."""
         of_joints = sum(3 if len(each) == 4 else 1 for _, each in self.positions)
@@ -110,7 +122,7 @@ def tree_states(
     Raises DescriptionError for more numbers than the joints have. Fewer get a note.
     """
     what = f"keyframe {shown(name)}"
-    q = np.array([x for tree in trees for x in _initial(tree)])
+    q = np.array([x for tree in trees for x in tree.initial])
     q = _filled(document, key, "qpos", what, q)
     v = _filled(document, key, "qvel", what, np.zeros(sum(tree.n_rates for tree in trees)))
     found, in_q, in_v = [], 0, 0
@@ -124,15 +136,6 @@ def tree_states(
 def position_and_quaternion(T: Floats) -> Numbers:
     """Return a pose (4, 4) as position and unit quaternion (x, y, z, w)."""
     return (*T[:3, 3].tolist(), *quat_from_rotation(T[:3, :3]).tolist())
-
-
-def _initial(tree: TreeCoordinates) -> Iterable[float]:
-    """Yield the numbers of `qpos0`."""
-    if tree.T_world_free is not None:
-        base = position_and_quaternion(tree.T_world_free)
-        yield from (*base[:3], *_as_wxyz(base[3:]))
-    for _, position in tree.positions:
-        yield from _as_wxyz(position) if len(position) == 4 else position
 
 
 def _filled(document: MjcfText, key: Element | None, attribute: str, what: str, default: Floats) -> Floats:
@@ -156,8 +159,9 @@ def _state(tree: TreeCoordinates, q: Floats, v: Floats) -> TreeState:
     if tree.T_world_free is not None:
         quat_xyzw = _unit_xyzw(q[3:7].tolist())
         base = (*q[:3].tolist(), *quat_xyzw)
-        # MuJoCo expresses the angular velocity in the axes of the body.
-        twist = np.concatenate([v[:3], rotation_from_quat(np.array(quat_xyzw)) @ v[3:6]])
+        if v[:6].any():
+            # MuJoCo expresses the angular velocity in the axes of the body.
+            twist = np.concatenate([v[:3], rotation_from_quat(np.array(quat_xyzw)) @ v[3:6]])
         in_q, in_v = 7, 6
     positions: dict[str, Numbers] = {}
     speeds: dict[str, Numbers] = {}

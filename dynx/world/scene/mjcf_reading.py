@@ -504,9 +504,11 @@ def _counted(count: int, one: str, several: str) -> str:
 
 def _exported_state(state: TreeState, tree: MjcfTree, renamed: MjcfTree) -> TreeState:
     """Return the state of a tree in the names, and for the first body, that `as_exported` gave it."""
+    if renamed is tree:
+        return state
     names = dict(zip(state.positions, (name for name, _ in renamed.positions), strict=True))
     base, twist, T_first = state.base, state.twist, state.T_world_free
-    if T_first is not None and renamed is not tree:
+    if T_first is not None:
         T = T_first @ inverse(tree.first.T_world_body) @ renamed.first.T_world_body
         arm = T[:3, 3] - T_first[:3, 3]
         base = position_and_quaternion(T)
