@@ -125,7 +125,7 @@ def lacking(report: Entry) -> str:
         for engine, reasons in found.items()
         for reason, names in reasons.items()
     )
-    return table(("engine", "cases", "reason (the first of the case)"), rows)
+    return table(("engine", "cases", "reason, for one figure of the case"), rows)
 
 
 def pairs(report: Entry) -> str:

@@ -540,17 +540,17 @@ class Viewer(Controls):
     ) -> None:
         """Write what is shown to a file, by its suffix.
 
-        ``.html`` shows the robot, or plays the motion, without a server and without a network. ``.gif`` and
-        ``.mp4`` (extra ``film``) are films of a motion, and ``.png`` is a picture, all drawn without a
-        browser. `progress` is called with the number of pictures drawn. These have the `size` given, width
-        and height [pixels], and are seen from a `direction` (3,) in the world, or by a `camera`, whose size
-        they have then. A film has `fps` pictures a second, or 12.5 and at most 500 in all for None. Pictures
-        and films show the marks, lines and text of the page, hide the parts that it hides, and say how large
-        the tiles of the ground are.
+        ``.html`` shows the robot, or plays the motion, without a server and without a network. ``.gif``,
+        ``.webp`` and ``.mp4`` (extra ``film``) are films of a motion, and ``.png`` is a picture, also of a
+        live world. All are drawn without a browser. `progress` is called with the number of pictures drawn.
+        These have the `size` given, width and height [pixels], and are seen from a `direction` (3,) in the
+        world, or by a `camera`, whose size they have then. A film has `fps` pictures a second, or 12.5 and at
+        most 500 in all for None. Pictures and films show the marks, lines and text of the page, hide the
+        parts that it hides, and say how large the tiles of the ground are.
 
-        Raises ArgumentError for a live world, whose motion is not known before it has happened, for another
-        suffix, for a file that cannot be written, for a page whose size, camera or direction is given, and
-        for an `fps` of another file than a film or beyond 100;
+        Raises ArgumentError for a page or a film of a live world, whose motion is not known in advance, for
+        another suffix, for a file that cannot be written, for a page whose size, camera or direction is
+        given, and for an `fps` of another file than a film or beyond 100;
         NotInstalledError without the package that writes the film.
         """
         from dynx.viewer.export import write_film, write_picture, write_recording

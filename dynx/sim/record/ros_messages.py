@@ -37,7 +37,7 @@ of their header is the time at which they were taken, and its frame is called li
 | topic | type | content |
 |---|---|---|
 | `/sensors/NAME` | sensor_msgs/Imu | the sample of an IMU, with the covariances of its white noise |
-| `/sensors/NAME` | geometry_msgs/WrenchStamped | wrench of a force-torque sensor; contact force |
+| `/sensors/NAME` | geometry_msgs/WrenchStamped | force-torque sensor: wrench; contact sensor: force |
 | `/sensors/NAME` | sensor_msgs/JointState | encoder: position, velocity; joint torque: effort |
 | `/sensors/NAME` | std_msgs/Float64 | distance of a ray sensor |
 

@@ -458,7 +458,7 @@ class SimulationOptions:
     )
     friction_slip: float = option(
         0.0,
-        "Velocity over which Coulomb friction is smoothed, so that joints never stick",
+        "Slip velocity s of smooth Coulomb friction f tanh(v / s); 0 for friction that holds joints at rest",
         unit="rad/s or m/s",
         kind=SLIP,
         group=JOINTS,
@@ -511,7 +511,7 @@ class SimulationOptions:
     )
     check_reference: bool = option(
         True,
-        "Refusal of a reference that violates the position or velocity limits of the robot",
+        "Check of the reference, with an error if it violates position or velocity limits of the robot",
         kind=FLAG,
         group=REFERENCE,
         flag="-",
