@@ -117,6 +117,8 @@ PYBULLET = {
 }
 """Functions of PyBullet, with what does the same in dynx."""
 
+_LOCAL = "for `pin.LOCAL`"
+
 PINOCCHIO = {
     "RobotWrapper": "dynx.backend('pinocchio', dynx.load(path))",
     "buildModelFromUrdf": _LOADED,
@@ -125,11 +127,16 @@ PINOCCHIO = {
     "computeABADerivatives": "dynx.Derivatives",
     "computeAllTerms": "the methods of Backend, such as Backend.mass_matrix(q) and Backend.bias_torque(q, v)",
     "computeForwardKinematicsDerivatives": (
-        "dynx.Derivatives for poses by q; Backend.jacobian(q, frame) for velocities by v"
+        "dynx.Derivatives.forward_kinematics_derivative(q, frame) for poses with respect to q; "
+        "Backend.jacobian(q, frame) for velocities with respect to v; no call for velocities and "
+        "accelerations with respect to q"
     ),
+    "computeFrameJacobian": f"Backend.jacobian(q, frame, reference='local') {_LOCAL}, the default of "
+    "Pinocchio",
     "computeJointJacobian": "Backend.jacobian(q, link, reference='local') of the child link",
     "computeJointJacobians": "Backend.jacobian(q, link, reference='world') of each child link",
-    "computeMinverse": "Backend.forward_dynamics(q, v, tau), or numpy.linalg.inv(Backend.mass_matrix(q))",
+    "computeMinverse": "numpy.linalg.inv(Backend.mass_matrix(q)); for the acceleration itself, "
+    "Backend.forward_dynamics(q, v, tau)",
     "computeRNEADerivatives": "dynx.Derivatives",
     "computeSupportedForceByFrame": (
         "Backend.joint_wrenches(q, v, a), which includes the child body of the joint"
@@ -139,10 +146,15 @@ PINOCCHIO = {
     "forwardKinematics": "Backend.forward_kinematics(q, frame)",
     "getFrameId": "no such call, because calls of dynx take the name of a frame; Model.frame_names lists the "
     "names",
-    "getFrameJacobian": "Backend.jacobian(q, frame, reference='local')",
+    "getFrameClassicalAcceleration": "Backend.frame_acceleration(q, v, a, frame) for "
+    "`pin.LOCAL_WORLD_ALIGNED`",
+    "getFrameJacobian": f"Backend.jacobian(q, frame, reference='local') {_LOCAL}",
+    "getFrameJacobianTimeVariation": f"Backend.jacobian_derivative(q, v, frame, reference='local') {_LOCAL}",
+    "getFrameVelocity": f"Backend.frame_velocity(q, v, frame, reference='local') {_LOCAL}, the default of "
+    "Pinocchio",
     "getJointId": "no such call, because calls of dynx take the name of a joint; Model.joint_names lists the "
     "names",
-    "getJointJacobian": "Backend.jacobian(q, link, reference='local') of the child link",
+    "getJointJacobian": f"Backend.jacobian(q, link, reference='local') of the child link, {_LOCAL}",
     "integrate": "Model.integrate(q, v)",
     "neutral": "Model.neutral()",
     "randomConfiguration": "Model.random(rng)",
