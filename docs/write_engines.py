@@ -199,12 +199,12 @@ def distances_table(rows: Sequence[Row], engines: Sequence[str]) -> str:
 
 
 def speed() -> str:
-    """Time one call and a batch of five quantities in every backend."""
+    """Time one call and a batch of five quantities on every engine."""
     return speed_table(json.loads(output_of(COMMANDS["speed"])))
 
 
 def speed_table(document: Mapping[str, Any]) -> str:
-    """Return microseconds of one call and nanoseconds of a sample in a batch, by backend and quantity."""
+    """Return microseconds of one call and nanoseconds of a sample in a batch, by engine and quantity."""
     times: dict[str, dict[str, dict[int, float]]] = {}
     for result in document["results"]:
         for way in result["ways"]:
@@ -216,7 +216,7 @@ def speed_table(document: Mapping[str, Any]) -> str:
         (name, *(times_cell(found.get(quantity, {})) for quantity in quantities))
         for name, found in times.items()
     ]
-    return table(("backend", *(each.replace("_", " ") for each in quantities)), rows)
+    return table(("engine", *(each.replace("_", " ") for each in quantities)), rows)
 
 
 def times_cell(by_batch: Mapping[int, float]) -> str:

@@ -38,7 +38,7 @@ VARIANTS = tuple(name for name in REGISTRY.built_in if ":" in name)
 """Names of dynx's own loading variants."""
 
 ENGINES = tuple(name for name in REGISTRY.built_in if name not in VARIANTS)
-"""Names of dynx's own engines."""
+"""Names of the built-in engines."""
 
 COMMON_VARIANTS = ("pybullet:plain",)
 """Variants so common that they are examined beside their engine by default."""
