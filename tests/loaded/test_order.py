@@ -93,15 +93,15 @@ def by_drake(path: Path, order: EngineOrder, q: Floats, v: Floats) -> dict[str, 
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
-    plant = MultibodyPlant(time_step=0.0)
-    Parser(plant).AddModels(str(path))
+    plant: Any = MultibodyPlant(time_step=0.0)
+    Parser(plant).AddModels(path)
     if not order.model.floating and path.suffix == ".urdf":
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(order.model.root))
     plant.Finalize()
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, order.from_dynx(q))
     plant.SetVelocities(context, order.velocity_from_dynx(q, v))
-    found = {}
+    found: dict[str, tuple[Floats, Floats]] = {}
     for link in order.model.links:
         body = plant.GetBodyByName(link.name)
         twist = plant.EvalBodySpatialVelocityInWorld(context, body)
@@ -167,7 +167,7 @@ def require_alike(
     engine: str, path: Path, model: Model, seed: int, rounding: float = ROUNDING
 ) -> EngineOrder:
     """Compare poses and twists of all links with those of an engine that knows nothing of dynx."""
-    order = model.order_of(engine)
+    order: EngineOrder = model.order_of(engine)
     rng = np.random.default_rng(seed)
     q, v = model.random(rng), rng.normal(size=model.nv)
     own = dynx.backend("reference", model)
@@ -274,4 +274,4 @@ def test_what_has_no_order_is_refused(tmp_path: Path) -> None:
 
 def test_an_engine_that_does_not_say_is_named() -> None:
     with pytest.raises(dynx.errors.BackendError, match="does not say in which order"):
-        LoadedRobot.coordinates(type("Other", (), {"name": "other"})())  # type: ignore[arg-type]
+        LoadedRobot.coordinates(type("Other", (), {"name": "other"})())
