@@ -122,8 +122,8 @@ class EngineOrder:
         return out
 
     def velocity_to_dynx(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """Return the velocity (..., nv) of dynx at its `q` (..., nq) and the engine's `v` (..., n)."""
-        q, v = checked_q(self.model, q), checked_array("v", v, self.coordinates.n_velocities)
+        """Return the velocity (..., nv) of dynx at the engine's `q` (..., n) and `v` (..., m)."""
+        q, v = self.to_dynx(q), checked_array("v", v, self.coordinates.n_velocities)
         shape = np.broadcast_shapes(q.shape[:-1], v.shape[:-1])
         out: Floats = np.broadcast_to(v[..., self.velocities], (*shape, self.model.nv)).copy()
         base = self.coordinates.base
