@@ -33,9 +33,12 @@ __all__ = [
     "NamedConfiguration",
     "Note",
     "Pose",
+    "StatedSensor",
     "build_mechanism",
 ]
 
 # Hidden from type checkers, which would take any name for an attribute.
 if not TYPE_CHECKING:
-    __getattr__ = moved_names(__name__, {})
+    __getattr__ = moved_names(__name__, {}, {"StatedSensor": "dynx.model.sensors"})
+else:
+    from dynx.model.sensors import StatedSensor

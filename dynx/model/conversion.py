@@ -37,6 +37,7 @@ from dynx.model.geometry import (
 )
 from dynx.model.geometry.asset_files import AssetFiles
 from dynx.model.loading import load
+from dynx.model.mjcf.sensor_objects import SensorObjects
 from dynx.model.mjcf.writer import MESH_SUFFIXES, RobotWriter
 from dynx.model.model import Model
 from dynx.model.sdf.writer import SdfWriter
@@ -201,6 +202,10 @@ def robot_differences(model: Model, back: Model) -> Iterator[str]:
         moving = {joint.name for joint in model.joints if joint.moves}
         if back.actuators != tuple(each for each in model.actuators if each.joint in moving):
             yield "the actuators differ"
+    if model.sensors is not None and back.sensors is not None:
+        parts = SensorObjects.of(back)
+        if back.sensors != tuple(each for each in model.sensors if parts.missing(each) is None):
+            yield "the sensors differ"
     if back.stated_configurations is not None:
         yield from _missing("configuration", [*model.configurations], [*back.configurations])
         for name in model.configurations:

@@ -234,7 +234,7 @@ def build_described(
             line=content.unread.line,
         ) from None
     if content.configurations is not None:
-        model = replace(model, stated_configurations=content.configurations)
+        model = replace(model, stated_configurations=content.configurations, sensors=content.sensors)
     return _with_frames(model, content.frames, source) if content.frames else model
 
 

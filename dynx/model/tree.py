@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from dynx.model.elements import (
 from dynx.model.geometry.links import ContactFilter, Geometry
 from dynx.registry import door
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.model.sensors import StatedSensor
 
 Base = Literal["fixed", "floating"]
 Part = TypeVar("Part")
@@ -57,6 +60,8 @@ class Tree:
     """Which collision shapes may touch; None if the description format does not say, as URDF and SDF."""
     stated_configurations: tuple[NamedConfiguration, ...] | None = field(default=None, compare=False)
     """Configurations that the description names, by joints; None if its format has none, as URDF and SDF."""
+    sensors: tuple[StatedSensor, ...] | None = field(default=None, compare=False)
+    """Sensors of the robot, as data; None for a description that is not MJCF."""
 
     def __post_init__(self) -> None:
         if self.floating and self.base_pose != IDENTITY:
@@ -311,6 +316,7 @@ class Description:
     actuators: tuple[Actuator, ...] | None = None
     contact_filter: ContactFilter | None = None
     configurations: tuple[NamedConfiguration, ...] | None = None
+    sensors: tuple[StatedSensor, ...] | None = None
 
 
 def checked_base(base: str) -> Literal["fixed", "floating"]:

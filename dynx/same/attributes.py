@@ -37,6 +37,7 @@ Kind = Literal[
     "visual shapes",
     "contact filter",
     "actuator",
+    "sensor",
     "frame",
     "name",
     "gravity",
@@ -49,7 +50,7 @@ class Attribute:
     """A difference beside the verdict, with the values in both descriptions and their lines."""
 
     kind: Kind
-    tag: Literal["joint", "link", "robot", "actuator"]
+    tag: Literal["joint", "link", "robot", "actuator", "sensor"]
     ours: str | None
     theirs: str | None
     first: str

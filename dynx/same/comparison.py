@@ -35,6 +35,7 @@ from dynx.same.elements import (
 from dynx.same.fit import Fit
 from dynx.same.mending import NotMendedError, mended_text
 from dynx.same.report import Coordinate, ElementDifference, SameReport, Unmatched
+from dynx.same.sensors import sensor_differences
 from dynx.same.skeleton import Skeleton, exact_skeleton, without_standing_mimics
 from dynx.same.text import inertial_text, pose_text, vector_text
 
@@ -139,6 +140,7 @@ def same_robot(
         contacts = [*contact_differences(first.model, second.model, analysis.fit, max(tolerance, 1e-15))]
         apart += [each for each in contacts if isinstance(each, Attribute)]
         apart += actuator_differences(first.model, second.model, analysis.fit, max(tolerance, 1e-15))
+        apart += sensor_differences(first.model, second.model, analysis.fit, max(tolerance, 1e-15))
         free += [each for each in contacts if isinstance(each, DescriptionFreedom)]
         free += [*freedoms(analysis.fit, tolerance), *_unseen(analysis)]
         limits = bounds(analysis.fit, _unseen_bodies(analysis)) if same else None
@@ -203,6 +205,8 @@ def _open_parts(first: _Loaded, second: _Loaded) -> Iterator[str]:
     for one, other in ((first, second), (second, first)):
         if other.model.actuators is None and one.model.actuators:
             yield f"{other.name} states no actuators; those of {one.name} are not compared"
+        if other.model.sensors is None and one.model.sensors:
+            yield f"{other.name} states no sensors; those of {one.name} are not compared"
         stated = one.model.contact_filter
         if other.model.contact_filter is None and stated is not None and stated.restricts:
             yield f"{other.name} leaves open which shapes touch; what {one.name} states is not compared"

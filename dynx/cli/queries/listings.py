@@ -20,6 +20,7 @@ from dynx.errors import BackendError
 from dynx.model import Joint, Link, Model, library
 from dynx.model.documents import pose_numbers
 from dynx.model.elements import IDENTITY
+from dynx.model.sensors import StatedSensor
 
 
 def info(json_path: str | None, **robot: Any) -> None:
@@ -54,6 +55,7 @@ def model_document(model: Model) -> dict[str, Any]:
             }
             for link in model.links
         ],
+        "sensors": None if model.sensors is None else [asdict(sensor) for sensor in model.sensors],
         "configurations": {name: q.tolist() for name, q in model.configurations.items()},
         "notes": [asdict(note) for note in model.notes],
     }
@@ -96,6 +98,8 @@ def _show(model: Model) -> None:
     added = [frame.name for frame in model.extra_frames]
     if added:
         out.print(f"frames besides the links: {', '.join(map(one_line, added))}")
+    if model.sensors:
+        out.print(f"sensors: {', '.join(one_line(_sensor(each)) for each in model.sensors)}")
     if model.configurations:
         out.print(f"named configurations: {', '.join(map(one_line, model.configurations))}")
     for note in model.notes:
@@ -144,6 +148,12 @@ def _mimic_rule(joint: Joint) -> str:
         return ""
     offset = "" if joint.mimic.offset == 0.0 else f" {joint.mimic.offset:+.6g}"
     return f"{number(joint.mimic.multiplier)} * {one_line(joint.mimic.joint)}{offset}"
+
+
+def _sensor(sensor: StatedSensor) -> str:
+    """Write name, type and objects of a sensor."""
+    words = [sensor.type, *(name for _, name in sensor.objects)]
+    return f"{sensor.name} ({' '.join(words)})" if sensor.name else " ".join(words)
 
 
 def _vector(values: tuple[float, ...]) -> str:

@@ -74,7 +74,7 @@ def _document(
     document = MjcfText(root, compiler, defaults, main_class, reading, options, folders)
     attacher = _Attacher(document, source, around)
     attacher.expand()
-    copies = _Replicates(document, attacher.sections)
+    copies = _Replicates(document)
     for tree in root.all("worldbody"):
         copies.expand(tree)
     return document
@@ -86,7 +86,8 @@ _SECTIONS = ("tendon", "contact", "equality", "actuator", "sensor")
 """Sections whose elements refer to parts of bodies or to elements of sections before them."""
 
 _REFERENCES = {
-    "body": ("body", "body1", "body2", "bodyname"),
+    "body": ("body", "body1", "body2", "bodyname", "subtree1", "subtree2"),
+    "camera": ("camera",),
     "joint": ("joint", "joint1", "joint2", "jointinparent"),
     "geom": ("geom", "geom1", "geom2"),
     "site": ("site", "site1", "site2", "refsite", "cranksite", "slidersite", "sidesite"),
@@ -97,6 +98,9 @@ _REFERENCES = {
 """Attributes of elements of `_SECTIONS` by the kind of element that they name."""
 
 _KIND_OF = {attribute: kind for kind, attributes in _REFERENCES.items() for attribute in attributes}
+
+_TO_WORLD = ("refname", "world")
+"""Reference of a sensor that is that to the world of the model around, as in MuJoCo."""
 
 _OF_ASSETS = frozenset(["class", "childclass", "mesh", "material", "texture", "hfield"])
 """Attributes that name a class of defaults or an asset."""
@@ -126,12 +130,16 @@ class _NamesByKind:
     def hold(self, element: Element, least: int = 0) -> bool:
         """Check whether all that an element refers to is among them, and that it refers to so much."""
         references = [*_references(element)]
-        return len(references) >= least and all(
-            any(name in names for names in self._names.values())
-            if kind == "any"
-            else name in self._names.get(kind, ())
-            for kind, name in references
-        )
+        return len(references) >= least and all(self.hold_name(kind, name) for kind, name in references)
+
+    def hold_any(self, element: Element) -> bool:
+        """Check whether any of what an element refers to is among them."""
+        return any(self.hold_name(kind, name) for kind, name in _references(element))
+
+    def hold_name(self, kind: str, name: str) -> bool:
+        """Check whether a name is among them; any kind of name for the kind ``any``."""
+        kinds = self._names.values() if kind == "any" else [self._names.get(kind, ())]
+        return any(name in names for names in kinds)
 
 
 def _references(element: Element) -> Iterator[tuple[str, str]]:
@@ -140,7 +148,7 @@ def _references(element: Element) -> Iterator[tuple[str, str]]:
         each = waiting.pop()
         waiting += each.children
         for attribute, value in each.attributes.items():
-            if attribute in _KIND_OF:
+            if attribute in _KIND_OF and (attribute, value) != _TO_WORLD:
                 yield _KIND_OF[attribute], value
 
 
@@ -160,7 +168,7 @@ class _Copier:
         if depth > MAX_DEPTH:
             raise self.reading.error(element, f"attached models are more than {MAX_DEPTH} elements deep")
         attributes = {
-            name: self._renamed(value) if self._is_name(name) else value
+            name: self._renamed(value) if self._is_name(name) and (name, value) != _TO_WORLD else value
             for name, value in element.attributes.items()
         }
         new = self.reading.like(element, attributes)
@@ -391,7 +399,7 @@ class _Attacher:
             copies = Element(tag, {}, parts[0].line if parts else 0)
             for section in sections:
                 for each in section.children if section.tag == tag else ():
-                    if names.hold(each, least=1):
+                    if names.hold(each, least=int(tag != "sensor")):
                         copies.children.append(copier.copy(each))
                         names.add(each, tag if tag in ("tendon", "actuator") else None)
             if copies.children:
@@ -423,24 +431,25 @@ def _has(element: Element, tag: str) -> bool:
 # -- copies -----------------------------------------------------------------------------------------------
 
 
-def _suffixed(element: Element, suffix: str, reading: MjcfReading) -> Element:
-    """Return a copy of an element of a section whose name and references have a suffix."""
+def _suffixed(element: Element, suffix: str, names: _NamesByKind, reading: MjcfReading) -> Element:
+    """Return a copy of an element of a section whose name, and references to `names`, have a suffix."""
     reading.count_copy(element, "<replicate>")
     attributes = {
-        name: f"{value}{suffix}" if name == "name" or name in _KIND_OF else value
+        name: f"{value}{suffix}"
+        if name == "name" or (name in _KIND_OF and names.hold_name(_KIND_OF[name], value))
+        else value
         for name, value in element.attributes.items()
     }
     new = reading.like(element, attributes)
-    new.children = [_suffixed(child, suffix, reading) for child in element.children]
+    new.children = [_suffixed(child, suffix, names, reading) for child in element.children]
     return new
 
 
 class _Replicates:
     """Replaces each ``<replicate>`` by its copies, each in a ``<frame>``."""
 
-    def __init__(self, document: MjcfText, attached: Sequence[Element]) -> None:
-        """`attached` are the sections that attached models brought."""
-        self._document, self._reading, self._attached = document, document.reading, attached
+    def __init__(self, document: MjcfText) -> None:
+        self._document, self._reading = document, document.reading
 
     def expand(self, element: Element) -> None:
         for child in element.children:
@@ -490,20 +499,25 @@ class _Replicates:
         return found
 
     def _copy_referring(self, element: Element, suffixes: Sequence[str]) -> None:
-        """Replace elements that attached models brought, and that refer to what is copied, by a copy each."""
+        """Replace the elements of sections that refer to what is copied by a copy each, at the end."""
         names = _NamesByKind()
         for child in element.children:
             names.add(child)
-        for section in self._attached:
-            section.children = [
-                each
-                for child in section.children
-                for each in (
-                    [_suffixed(child, suffix, self._reading) for suffix in suffixes]
-                    if names.hold(child, least=1)
-                    else [child]
-                )
-            ]
+        for tag in _SECTIONS:
+            for section in self._document.root.all(tag):
+                # Constraints between a copy and another part stay as they are, as in MuJoCo.
+                copied = [
+                    names.hold(each, least=1) if tag == "equality" else names.hold_any(each)
+                    for each in section.children
+                ]
+                referring = [each for each, yes in zip(section.children, copied, strict=True) if yes]
+                others = [each for each, yes in zip(section.children, copied, strict=True) if not yes]
+                copies = [
+                    _suffixed(each, suffix, names, self._reading) for suffix in suffixes for each in referring
+                ]
+                section.children = [*others, *copies]
+                for each in referring if tag in ("tendon", "actuator") else ():
+                    names.add(each, tag)
 
     def _renamed(self, element: Element, suffix: str) -> Element:
         self._reading.count_copy(element, "<replicate>")

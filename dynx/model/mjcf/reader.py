@@ -45,8 +45,11 @@ from dynx.model.mjcf.document import MjcfText, turn
 from dynx.model.mjcf.expansion import read_document
 from dynx.model.mjcf.extension import MIMIC, Extension
 from dynx.model.mjcf.keyframes import NOT_OF_A_POSITION, TreeCoordinates, read_keyframes, tree_states
+from dynx.model.mjcf.sensor_objects import SensorObjects
+from dynx.model.mjcf.sensors import read_sensors, require_objects
 from dynx.model.mjcf.shapes import Geom, GeomReader
 from dynx.model.package_search import StrPath
+from dynx.model.sensors import StatedSensor
 from dynx.model.topology import MAX_LINKS
 from dynx.model.tree import Base, Description
 from dynx.model.urdf.reader import inertia_fault
@@ -95,7 +98,7 @@ _NOT_IN_TREE = {
 }
 _OF_SCENES = ("equality", "contact", "keyframe")
 """Sections that a scene reads."""
-_OF_ONE_ROBOT = ("actuator", "contact", "keyframe")
+_OF_ONE_ROBOT = ("actuator", "contact", "keyframe", "sensor")
 """Sections that are read of one robot, as data."""
 _IN_ROOT = frozenset(
     ["compiler", "option", "size", "statistic", "visual", "default", "asset", "worldbody", "custom"]
@@ -259,7 +262,11 @@ class _TreeReader:
         self._document.options.note(self._reading, scene=False)
         content = self._description(name, base, self._document.options.gravity, self._reading.notes)
         return replace(
-            content, actuators=actuators, contact_filter=contact_filter, configurations=configurations
+            content,
+            actuators=actuators,
+            contact_filter=contact_filter,
+            configurations=configurations,
+            sensors=self._read_sensors(content),
         )
 
     def read_trees(self) -> MjcfTrees:
@@ -292,6 +299,7 @@ class _TreeReader:
             positions = tuple(parts.positions)
             found.append(MjcfTree(description, tuple(parts.bodies), free, positions, parts.aligned))
         self._require_joints_of_motors(root)
+        require_objects(self._document)
         self._note_counts(root)
         return MjcfTrees(
             self._document,
@@ -743,6 +751,20 @@ class _TreeReader:
                 element,
                 f"not read: {_counted(len(left), 'element')} of <actuator>; {_NOT_IN_TREE['actuator']} "
                 f"(the first is left out because {reason})",
+            )
+        return taken
+
+    def _read_sensors(self, content: Description) -> tuple[StatedSensor, ...]:
+        """Return the sensors of the robot, with a note on those that are left out."""
+        frames = (each.name for each in content.frames)
+        sites = dict(zip((each.name for each in self._parts.sites), frames, strict=True))
+        taken, left = read_sensors(self._document, SensorObjects.of(content), self._link_of, sites)
+        if left:
+            element, reason = left[0]
+            self._reading.note(
+                element,
+                f"not read: {_counted(len(left), 'element')} of <sensor> (the first is left out because "
+                f"{reason})",
             )
         return taken
 

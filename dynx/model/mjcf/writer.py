@@ -47,6 +47,8 @@ from dynx.model.mjcf.attributes import (
     text,
 )
 from dynx.model.mjcf.extension import MIMIC, Extension
+from dynx.model.mjcf.sensor_objects import SensorObjects
+from dynx.model.mjcf.sensors import write_sensors
 from dynx.model.tree import Tree
 from dynx.model.urdf.reader import inertia_fault
 from dynx.model.urdf.writer import listed, note_of_kind
@@ -84,9 +86,10 @@ def write_mjcf(tree: Tree, /) -> str:
 
     `dynx.load` of the text returns a model with the same links, joints, frames, inertias, limits and
     coefficients, to rounding. MuJoCo compiles it unless a comment says why not. Angles are in radians. Visual
-    geoms are in group 2 and do not collide; collision geoms are in group 3. The actuators are those of the
-    robot. Where its description leaves them open, a motor acts on each joint with a coordinate of its own;
-    its range is the effort limit. Meshes are named by their full paths; ``dynx convert`` copies them.
+    geoms are in group 2 and do not collide; collision geoms are in group 3. The actuators and sensors are
+    those of the robot. Where its description leaves actuators open, a motor acts on each joint with a
+    coordinate of its own; its range is the effort limit. Meshes are named by their full paths;
+    ``dynx convert`` copies them.
 
     Raises DescriptionError for a name that MJCF cannot express and a limit that is NaN,
     UnsupportedFeatureError for a link named ``world`` that is not the root, and for too many links in a row.
@@ -140,6 +143,7 @@ class RobotWriter:
             for each in tree.actuators:
                 if each.joint not in moving:
                     _add(self._kinds, "Actuators on joints that do not move are left out", each.joint)
+        self._add_sensors(SubElement(root, "sensor"))
         self._add_keyframes(SubElement(root, "keyframe"))
         self._extension.write(root)
         for empty in [
@@ -233,6 +237,7 @@ class RobotWriter:
         below: dict[str, list[Joint]] = {}
         for joint in tree.joints:
             below.setdefault(joint.parent, []).append(joint)
+        sensed = {name for each in tree.sensors or () for kind, name in each.objects if "body" in kind}
         row: dict[str, int] = {}
         for joint in tree.joints:
             link, next_ones = tree.link(joint.child), below.get(joint.child, [])
@@ -246,6 +251,7 @@ class RobotWriter:
                 and shapes == LinkGeometry()
                 and not (shapes.visual_fault or shapes.collision_fault)
                 and link.name not in frames
+                and link.name not in sensed
                 and link.name != WORLD
                 and row[link.name] < MAX_JOINTS_OF_A_BODY
             ):
@@ -307,6 +313,20 @@ class RobotWriter:
         elif effort > 0.0:
             given = {"ctrlrange": text((-effort, effort))} if effort < UNLIMITED else {}
             SubElement(self._actuator, "motor", {"name": joint.name, "joint": joint.name} | given)
+
+    def _add_sensors(self, section: Element) -> None:
+        """Add the sensors whose objects are in the document."""
+        tree = self._tree
+        parts = SensorObjects.of(tree, self._geom_names)
+        written = []
+        for each in tree.sensors or ():
+            missing = parts.missing(each)
+            if missing is None:
+                written.append(each)
+            else:
+                kind = f"Sensors of a {missing} that the document lacks are left out"
+                _add(self._kinds, kind, each.name or each.type)
+        write_sensors(section, written, self._body_names)
 
     def _add_keyframes(self, section: Element) -> None:
         """Add the named configurations, in the order of MuJoCo's joints, which is that of the tree."""

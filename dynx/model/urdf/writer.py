@@ -223,10 +223,13 @@ def urdf_notes(tree: Tree) -> Iterator[str]:
 
 
 def notes_of_open_parts(tree: Tree, language: str) -> Iterator[str]:
-    """Yield notes on actuators, contacts and configurations of a robot, which a format leaves open."""
+    """Yield notes on actuators, sensors, contacts and configurations, which a format leaves open."""
     if tree.actuators:
         joints = dict.fromkeys(each.joint for each in tree.actuators)
         yield f"{language} has no actuators of a robot; those of some joints are left out ({listed(joints)})."
+    if tree.sensors:
+        names = listed(each.name or each.type for each in tree.sensors)
+        yield f"{language} has no sensors as MJCF has them; those of the robot are left out ({names})."
     if tree.contact_filter is not None and tree.contact_filter.restricts:
         yield f"{language} does not state which shapes may touch; what the robot's file states is left out."
     if tree.configurations:

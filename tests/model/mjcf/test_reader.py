@@ -486,7 +486,7 @@ def test_copies_of_copies_are_bounded() -> None:
 def test_what_is_not_part_of_the_model_is_named() -> None:
     text = ARM.replace(
         "</worldbody>",
-        '</worldbody><actuator><motor joint="hinge"/></actuator><sensor><gyro site="x"/></sensor>'
+        '</worldbody><actuator><motor joint="hinge"/></actuator><sensor><user dim="1"/></sensor>'
         '<equality><weld body1="link"/></equality><tendon><fixed/></tendon>'
         '<keyframe><key act="1"/></keyframe><contact><exclude body1="a" body2="b"/></contact>',
     ).replace('axis="0 1 0"', 'axis="0 1 0" stiffness="3 1" springref="0.1"')

@@ -1,0 +1,35 @@
+"""Sensors that a robot description states, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class StatedSensor:
+    """Sensor of a robot, as its description states it. It is data: dynx simulates sensors of scenes alone
+    (`dynx.world.sensors`).
+
+    `type` is that of MuJoCo, such as ``"gyro"``. `object` names what is sensed, and `object_type` its kind:
+    ``"site"`` (a frame of the model), ``"xbody"`` (a link), ``"body"`` (a link; MuJoCo senses the frame of
+    its inertia), ``"geom"``, ``"joint"``, ``"tendon"``, ``"actuator"``, ``"camera"``, or ``""`` for nothing.
+    `reference` and `reference_type` are the second object of those that have two. `cutoff` bounds the
+    absolute value, unless it is 0, and `noise` is a standard deviation, both in the unit of the reading.
+    `name` may be empty.
+    """
+
+    name: str
+    type: str
+    object_type: str = ""
+    object: str = ""
+    reference_type: str = ""
+    reference: str = ""
+    cutoff: float = 0.0
+    noise: float = 0.0
+    line: int | None = field(default=None, compare=False)
+
+    @property
+    def objects(self) -> tuple[tuple[str, str], ...]:
+        """Kind and name of each object."""
+        both = (self.object_type, self.object), (self.reference_type, self.reference)
+        return tuple(each for each in both if each[0])
