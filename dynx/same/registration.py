@@ -8,7 +8,7 @@ Two lines, or a line and a point off it, determine the transform up to the signs
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations, product
+from itertools import combinations, islice, product
 
 import numpy as np
 
@@ -98,6 +98,7 @@ def _frames(skeleton: Skeleton, body: int, inertia: RigidInertia) -> Iterator[li
         principal, symmetric = principal_frames(inertia)
         yield principal
         lines += [(center, axis) for axis in symmetric]
+    lines += list(_lines_of_slides(skeleton, body, center))
     for line in lines:
         yield [] if center is None else _frames_of_point(line, center)
     for one, other in combinations(lines, 2):
@@ -115,6 +116,23 @@ def _own_line(skeleton: Skeleton, body: int) -> Line | None:
 def _line(skeleton: Skeleton, child: int) -> Line:
     T = skeleton.placements[child]
     return T[:3, 3], T[:3, :3] @ skeleton.axes[child]
+
+
+def _lines_of_slides(skeleton: Skeleton, body: int, center: Floats | None) -> Iterator[Line]:
+    """Yield the directions of prismatic joints at a body, through its centre of mass, and the lines from that
+    to the centres of mass of what slides. A slide has a direction, and no point of its own."""
+    slides = (each for each in skeleton.children[body] if not skeleton.bodies[each].revolute)
+    for child in islice(slides, MAX_LINES):
+        start, direction = _line(skeleton, child)
+        yield (start if center is None else center), direction
+        inertia = skeleton.inertias[child]
+        if center is None or not float(inertia.mass) > 0.0:
+            continue
+        T = skeleton.placements[child]
+        away = T[:3, 3] + T[:3, :3] @ (inertia.first_moment / float(inertia.mass)) - center
+        length = float(np.linalg.norm(away))
+        if length > PARALLEL * float(np.linalg.norm(center)):
+            yield center, away / length
 
 
 def principal_frames(inertia: RigidInertia) -> tuple[list[Floats], list[Floats]]:

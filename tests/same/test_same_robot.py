@@ -525,3 +525,45 @@ def test_shapes_are_named_by_the_link_that_has_them(swapped: bool) -> None:
         (found,) = same_robot(*pair).attributes
         assert (found.kind, found.ours, found.theirs) == ("visual shapes", "plate", "plate")
         assert (found.first_line, found.second_line) == (2, 2)
+
+
+BALL = (
+    '<inertial><origin xyz="{}"/><mass value="{}"/>'
+    '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+ROD = BALL.replace('izz="0.1"', 'izz="0.02"')
+SLIDES = {
+    "no mass": ("", "", ("prismatic",)),
+    "no mass, two slides": ("", "", ("prismatic", "prismatic")),
+    "no mass, slide and hinge": ("", "", ("prismatic", "revolute")),
+    "two balls": (BALL.format("0 0 0", 1), BALL.format("0 0 0", 2), ("prismatic",)),
+    "two balls beside their frames": (BALL.format("0.1 0 0.2", 1), BALL.format("0 0.1 0", 2), ("prismatic",)),
+    "rod and ball": (ROD.format("0 0 0", 1), BALL.format("0 0 0", 2), ("prismatic",)),
+    "ball, two slides": (BALL.format("0.1 0 0", 1), BALL.format("0 0 0.1", 2), ("prismatic", "prismatic")),
+    "ball, slide and hinge": (
+        BALL.format("0.1 0 0", 1),
+        BALL.format("0 0 0.1", 2),
+        ("prismatic", "revolute"),
+    ),
+}
+
+
+@pytest.mark.parametrize("rewrite", ["frames moved", "other names"])
+@pytest.mark.parametrize("case", SLIDES)
+def test_slides_determine_the_frame_of_a_symmetric_floating_base(case: str, rewrite: str) -> None:
+    base, child, types = SLIDES[case]
+    parts = [
+        f'<link name="b{k}">{child}</link>'
+        f'<joint name="j{k}" type="{kind}"><parent link="a"/><child link="b{k}"/>'
+        f'<origin xyz="0.1 {0.2 + k} 0.3" rpy="0.3 0.1 0.2"/><axis xyz="{axis}"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        for k, (kind, axis) in enumerate(zip(types, ("0 1 0", "0.6 0 0.8"), strict=False))
+    ]
+    model = dynx.load(
+        f'<robot name="r"><link name="a">{base}</link>{"".join(parts)}</robot>', base="floating"
+    )
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        moved = with_moved_frames(model, rng)
+        other = moved if rewrite == "frames moved" else REWRITES[rewrite](moved, rng)
+        assert dynx.same_robot(model, other).same
