@@ -32,12 +32,14 @@ _CAMERA = "World.camera(dynx.world.Camera(...))"
 _WHOLE_STEP = "World.step(torques={robot: tau}), which does mj_step1 and mj_step2 together"
 _FILES = "dynx.load(path) for a robot in URDF or xacro, and dynx.world.read_scene(path) for a scene"
 _SAVE = "World.save(), or World.write(path) for a file"
-_VIEW = "World.view(), a page in the browser"
 _CLOSE = "World.close(), or a with block"
 _START = "World(scene, engine='pybullet'), without a window; World.view shows it"
 _SETTINGS = "an option of World(scene, ...), such as dt, substeps or a setting of the engine"
 _LOADED = "dynx.load(path)"
 _EULER = "roll, pitch, yaw [rad]"
+_WITH_ARMATURE = "Backend.mass_matrix(q, joint_dynamics=True)"
+_TORQUE = "Backend.inverse_dynamics(q, v, a, joint_dynamics=True)"
+_ACCELERATION = "Backend.forward_dynamics(q, v, tau, joint_dynamics=True)"
 
 PYBULLET = {
     "addUserDebugLine": "`viewer.line(...)`, where `viewer` is World.view()",
@@ -78,13 +80,15 @@ PYBULLET = {
     "getLinkStates": "Backend.forward_kinematics(q, frames)",
     "getMatrixFromQuaternion": "dynx.rotation_from_quat(quat_xyzw)",
     "getNumBodies": "Scene.robots and Scene.bodies",
-    "getNumJoints": "`len(Model.joints)`, with fixed joints; Model.joint_names lists the joints that move",
+    "getNumJoints": "`len(Model.joints)`, with fixed joints; Model.joint_names has no fixed, mimic or "
+    "locked joints",
     "getOverlappingObjects": "World.overlapping(lower, upper)",
     "getPhysicsEngineParameters": "World.options and World.settings",
     "getQuaternionFromEuler": f"dynx.quat_from_rpy(rpy): {_EULER}, result x, y, z, w",
     "getVisualShapeData": "Model.geometry",
     "invertTransform": "numpy.linalg.inv(T) of a pose (4, 4); the transpose of a rotation (3, 3)",
-    "loadMJCF": "dynx.load(path) for a robot; MJCF is written by Model.to_mjcf and World.to_mjcf",
+    "loadMJCF": "dynx.load(path) for a robot, dynx.world.read_scene(path) for a scene; Model.to_mjcf and "
+    "World.to_mjcf write MJCF",
     "loadSDF": "dynx.load(path) for a robot",
     "loadURDF": f"{_LOADED}, and dynx.world.SceneRobot(name, model) in a Scene",
     "multiplyTransforms": "T_AB @ T_BC of poses (4, 4)",
@@ -94,14 +98,16 @@ PYBULLET = {
     "removeConstraint": "a Scene without the constraint, in a new World",
     "resetBasePositionAndOrientation": _SET_STATE,
     "resetBaseVelocity": _SET_STATE,
-    "resetDebugVisualizerCamera": _VIEW,
+    "resetDebugVisualizerCamera": "`viewer.look_from(dynx.world.Camera.look_at(...))`, where `viewer` is "
+    "World.view()",
     "resetJointState": _SET_STATE,
     "resetJointStateMultiDof": _SET_STATE,
     "resetSimulation": "World.reset()",
     "restoreState": "World.restore(snapshot)",
     "saveBullet": _SAVE,
     "saveState": _SAVE,
-    "setAdditionalSearchPath": "dynx.load(path, package_dirs=[...]); pybullet_data needs no such path",
+    "setAdditionalSearchPath": "dynx.load(path, package_dirs=[...]); dynx.load('r2d2.urdf') finds this "
+    "file of pybullet_data without `package_dirs`",
     "setCollisionFilterGroupMask": "Scene.ignored, pairs of parts that do not touch",
     "setCollisionFilterPair": "Scene.ignored, pairs of parts that do not touch",
     "setGravity": "gravity=(0, 0, -9.81) of Scene, or of dynx.load",
@@ -165,14 +171,20 @@ PINOCCHIO = {
 
 MUJOCO = {
     "MjData": "World(scene, engine='mujoco'), whose state is World.state",
-    "MjModel": f"{_LOADED} for a robot, or World(scene, engine='mujoco') for a scene",
+    "MjModel": f"{_LOADED} for a robot; for a scene World(scene, engine='mujoco'), where `scene` is "
+    "dynx.world.read_scene(path)",
     "mj_applyFT": _FORCE,
     "mj_contactForce": "World.contacts(part), each with its force",
-    "mj_crb": "Backend.mass_matrix(q)",
+    "mj_crb": _WITH_ARMATURE,
     "mj_differentiatePos": "Model.difference(q0, q1)",
+    "mj_energyPos": "Backend.potential_energy(q, joint_dynamics=True)",
+    "mj_energyVel": "Backend.kinetic_energy(q, v, joint_dynamics=True)",
+    "mj_forward": f"{_ACCELERATION}, without limits and contacts",
+    "mj_fullM": _WITH_ARMATURE,
     "mj_geomDistance": "World.closest_points(a, b)",
     "mj_getTotalmass": "Model.total_mass",
     "mj_integratePos": "Model.integrate(q, v)",
+    "mj_inverse": f"{_TORQUE}, without limits and contacts",
     "mj_jacBody": "Backend.jacobian(q, frame)",
     "mj_jacSite": "Backend.jacobian(q, frame)",
     "mj_name2id": "no such call, because calls of dynx take the name of a part",
@@ -189,11 +201,15 @@ MUJOCO = {
 DRAKE = {
     "AdvanceTo": "World.run(duration)",
     "CalcBiasSpatialAcceleration": "`Backend.jacobian_derivative(q, v, frame) @ v`",
-    "CalcInverseDynamics": "Backend.inverse_dynamics(q, v, a, joint_dynamics=True), which includes gravity, "
-    "damping and dry friction",
-    "CalcMassMatrix": "Backend.mass_matrix(q, joint_dynamics=True)",
-    "CalcMassMatrixViaInverseDynamics": "Backend.mass_matrix(q, joint_dynamics=True)",
+    "CalcBiasTerm": "Backend.bias_torque(q, v), which also includes gravity",
+    "CalcGravityGeneralizedForces": "Backend.gravity_torque(q), with the opposite sign",
+    "CalcInverseDynamics": f"{_TORQUE}, which includes armature, as Drake does, and also gravity, damping, "
+    "dry friction and springs",
+    "CalcKineticEnergy": "Backend.kinetic_energy(q, v, joint_dynamics=True)",
+    "CalcMassMatrix": _WITH_ARMATURE,
+    "CalcMassMatrixViaInverseDynamics": _WITH_ARMATURE,
     "CalcPoseInWorld": "Backend.forward_kinematics(q, frame)",
+    "CalcPotentialEnergy": "Backend.potential_energy(q, joint_dynamics=True)",
     "CalcRelativeTransform": "`numpy.linalg.inv(T_WA) @ T_WB`, with both poses by "
     "Backend.forward_kinematics(q, frame)",
     "CalcSpatialMomentumInWorldAboutPoint": "Backend.centroidal_momentum(q, v), about the centre of mass",
@@ -208,6 +224,7 @@ DRAKE = {
     "SetPositions": _SET_STATE,
     "SetVelocities": _SET_STATE,
     "Simulator": "World(scene, engine='drake'), then World.run(duration)",
+    "get_generalized_acceleration_output_port": _ACCELERATION,
     "num_positions": "Model.nq",
     "num_velocities": "Model.nv",
 }
