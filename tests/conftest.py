@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import gc
 import os
-import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Generator
@@ -67,15 +66,6 @@ each takes a good part of a second or more, and repeats the others on another ro
 
 LARGEST_CHUNK = 2
 """Largest number of tests that a parallel worker is given at a time."""
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """Half as many processes again as processors, for ``-n auto``: a third of the time tests wait, for a
-    browser or for a process of their own."""
-    # A container may have fewer than the machine.
-    processors = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
-    return processors + (processors + 1) // 2
 
 
 def pytest_configure(config: pytest.Config) -> None:
