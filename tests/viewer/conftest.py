@@ -108,8 +108,17 @@ def until(condition: Callable[[], object], what: str) -> None:
 
 
 def connected(viewer: Viewer, count: int = 1) -> list[Any]:
-    """Return the open pages of a viewer once there are `count`."""
-    until(lambda: len(viewer.page.server.get_clients()) >= count, f"{count} connected pages")
+    """Return the open pages of a viewer once there are `count`, and each has the camera of its view.
+
+    A page may report the place from which viser looks first, before it takes over that of the viewer.
+    """
+
+    def ready() -> bool:
+        clients = list(viewer.page.server.get_clients().values())
+        places = (each.camera.position for each in clients)
+        return len(clients) >= count and not any(np.allclose(place, 3.0) for place in places)
+
+    until(ready, f"{count} connected pages")
     clients = viewer.page.server.get_clients()
     return [clients[k] for k in sorted(clients)]
 

@@ -79,15 +79,9 @@ def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: Ope
         mouse = page.page.mouse
         hover(page, viewer.view.drawn.parts[name].name, name)
         mouse.move(*held)
-
-        def clicked() -> bool:
-            # Under load a page may get a click before it has drawn what is under the pointer.
-            page.page.wait_for_timeout(PICTURE)
-            mouse.click(*held)
-            page.page.wait_for_timeout(PICTURE)
-            return bool(viewer.view.names.shown == name)
-
-        until(clicked, "the name of the part that was clicked")
+        page.page.wait_for_timeout(PICTURE)
+        mouse.click(*held)
+        until(lambda: viewer.view.names.shown == name, "the name of the part that was clicked")
         steps = [lambda x=x: mouse.move(held[0] + x, held[1]) for x in (30.0, 60.0)]
         for action in (mouse.down, *steps):
             action()
