@@ -33,6 +33,7 @@ from dynx.simd.rows import (
     store_column,
 )
 from dynx.simd.schedule import ELEMENTARY, Segment, TrigGroup, schedule, spill_slots
+from dynx.simd.streaming import Streaming
 from dynx.simd.target import Processor
 from dynx.simd.trigonometry import declarations, replacements, sines_and_cosines
 from dynx.simd.verify import check_schedule
@@ -154,7 +155,7 @@ def _functions(
         made(program, target, settings, segment, slots, number).text(linkage)
         for number, segment in enumerate(segments)
     ]
-    return bodies, rows, _loop(program, settings, len(segments), size)
+    return bodies, rows, _loop(program, settings, segments, size)
 
 
 def _called(segments: int, settings: Settings) -> list[str]:
@@ -169,10 +170,17 @@ def _module(functions: Sequence[str], target: Processor, settings: Settings) -> 
     return "\n".join(parts) + "\n"
 
 
-def _loop(program: Program, settings: Settings, segments: int, slots: int) -> str:
-    """Return the entry function: a loop over groups of `lanes` samples, of which the last may overlap."""
-    lanes = settings.lanes
+def _loop(program: Program, settings: Settings, segments: Sequence[Segment], slots: int) -> str:
+    """Return the entry function, a loop over groups of `lanes` samples, of which the last may overlap; and
+    what it needs to stream rows of results."""
+    lanes, streaming = settings.lanes, Streaming(program, settings.lanes)
+    called, constant = _called(len(segments), settings), []
+    if not settings.quick:
+        constant = [name for name, segment in zip(called, segments, strict=True) if segment.constant]
+    words = "%words" if streaming.arrays else "%arguments"
+    start = "begin" if streaming.arrays else "entry"
     lines = [
+        *streaming.functions(),
         f"define void @{ENTRY}(ptr noalias nocapture readonly %arguments) {{",
         "entry:",
         f"  %kept = alloca [{slots} x <{lanes} x double>], align 64",
@@ -180,20 +188,24 @@ def _loop(program: Program, settings: Settings, segments: int, slots: int) -> st
         f"  %last = sub i64 %n, {lanes}",
         *_prefetch_pointers(program),
         *([f"  call void @{FILL}(ptr %kept)"] if settings.quick else []),
+        *streaming.begin(constant),
         "  br label %group",
         "group:",
-        "  %i = phi i64 [0, %entry], [%next, %group]",
+        f"  %i = phi i64 [0, %{start}], [%next, %{'grouped' if streaming.arrays else 'group'}]",
         "  %late = icmp sgt i64 %i, %last",
         "  %first = select i1 %late, i64 %last, i64 %i",
     ]
     lines += _prefetch(program, lanes)
-    called = _called(segments, settings)
-    lines += [f"  call void @{name}(ptr %arguments, i64 %first, ptr %kept)" for name in called]
+    lines += streaming.before_group()
+    varying = [name for name in called if name not in constant]
+    lines += [f"  call void @{name}(ptr {words}, i64 %first, ptr %kept)" for name in varying]
+    lines += streaming.after_group(constant)
     lines += [
         f"  %next = add i64 %i, {lanes}",
         "  %more = icmp slt i64 %next, %n",
         "  br i1 %more, label %group, label %done",
         "done:",
+        *streaming.end(),
         "  ret void",
         "}",
     ]

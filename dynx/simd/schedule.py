@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from dynx.simd.program import Program, scalar_ranges
 from dynx.simd.rows import tiles
+from dynx.simd.streaming import streamed_outputs
 
 TRIG = frozenset({"sin", "cos"})
 ELEMENTARY = frozenset({"exp", "tanh", "arctan"})
@@ -57,13 +58,15 @@ class Segment:
     stores: list[TileStore] = field(default_factory=list)
 
     spilled: set[int] = field(default_factory=set)
+    constant: bool = False
+    """True if it stores constants in streamed rows (`dynx.simd.streaming`), and nothing else."""
 
 
 def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
     """Divide the program into segments of about half of `longest` operations; into one if it has at most
     `longest`.
 
-    A group of angles is never divided.
+    A group of angles is never divided. Constants in streamed rows are stored by segments of their own.
     """
     steps = list(_steps(program))
     if sum(_operation_count(program, step) for step in steps) > longest:
@@ -78,8 +81,14 @@ def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
         length += size
         for node in _computed_nodes(step):
             segment_of[node] = len(segments) - 1
+    streamed, constants = streamed_outputs(program, lanes), Segment(constant=True)
     for store in _stores(program, lanes):
-        segments[max((segment_of.get(node, 0) for node in store.nodes), default=0)].stores.append(store)
+        if store.output in streamed and all(program.nodes[node].op == "constant" for node in store.nodes):
+            constants.stores.append(store)
+        else:
+            segments[max((segment_of.get(node, 0) for node in store.nodes), default=0)].stores.append(store)
+    if constants.stores:
+        segments.append(constants)
     segments = [part for segment in segments for part in _divide_stores(segment)]
     for number, segment in enumerate(segments):
         segment_of.update((node, number) for step in segment.steps for node in _computed_nodes(step))
@@ -92,9 +101,9 @@ def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
 
 def _divide_stores(segment: Segment) -> Iterator[Segment]:
     """Yield the segment with its first stores, then segments with the others."""
-    yield Segment(segment.steps, segment.stores[:MAX_STORES])
+    yield Segment(segment.steps, segment.stores[:MAX_STORES], constant=segment.constant)
     for first in range(MAX_STORES, len(segment.stores), MAX_STORES):
-        yield Segment([], segment.stores[first : first + MAX_STORES])
+        yield Segment([], segment.stores[first : first + MAX_STORES], constant=segment.constant)
 
 
 def program_length(program: Program) -> int:
