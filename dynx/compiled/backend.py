@@ -62,6 +62,7 @@ class CompiledBackend(Backend):
     name: ClassVar[str] = "compiled"
     vectorized: ClassVar[bool] = True
     compiles: ClassVar[bool] = True
+    takes_ball_joints: ClassVar[bool] = True
 
     _arguments: FastArguments
 

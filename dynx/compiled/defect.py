@@ -24,8 +24,8 @@ MAX_RESULT = 1e300
 def argument_defect(mechanism: Mechanism, q: Array, *rates: Array) -> Array:
     """Return the sum of squares of all arguments; far above `MAX_DEFECT` for a quaternion not of length 1."""
     total = sum_by_pairs([x * x for x in np.concatenate([q, *rates])])
-    if mechanism.floating:
-        total = total + quaternion_defect(q[3:7])
+    for first in (*(3,) * mechanism.floating, *mechanism.ball_places):
+        total = total + quaternion_defect(q[first : first + 4])
     return np.array([total], dtype=object)
 
 

@@ -20,7 +20,7 @@ from dynx.rbd.elimination import factorize_mass_matrix, filled_entries, solve_wi
 from dynx.simd.differentiate import differentiate
 from dynx.simd.program import Program
 from dynx.simd.trace import inline, trace
-from dynx.spatial.branchless import displace
+from dynx.spatial.manifold import displace
 from dynx.spatial.scalar import Array
 from dynx.spatial.se3 import homogeneous
 
@@ -32,7 +32,7 @@ a robot with a fixed base, because the poses of its few joints have many zeros."
 def inverse_dynamics_derivatives(mechanism: Mechanism) -> Program:
     """Return the program of q, v and a, with the outputs dtau_dq, dtau_dv and dtau_da, each (nv, nv)."""
     shapes = argument_shapes(mechanism, "qva")
-    if not mechanism.floating and pair_count(mechanism) <= MAX_DIFFERENTIATED_PAIRS:
+    if mechanism.balls or (not mechanism.floating and pair_count(mechanism) <= MAX_DIFFERENTIATED_PAIRS):
         program = _differentiated_torque(mechanism)
         return trace(lambda q, v, a: _torque_derivatives(program, q, v, a), shapes)
     return trace(lambda q, v, a: _closed_form(mechanism, q, v, a), shapes)
@@ -89,13 +89,17 @@ def pose_derivative(mechanism: Mechanism, frame: int) -> Program:
     shapes = argument_shapes(mechanism, "qv")
 
     def pose(q: Array, d: Array) -> dict[str, Array]:
-        (tree,) = tree_coordinates(mechanism, displace(q, d, floating=mechanism.floating))
+        (tree,) = tree_coordinates(mechanism, _displaced(mechanism, q, d))
         poses = kinematics.body_poses(mechanism, tree)
         return {"T": homogeneous(*kinematics.frame_pose(mechanism, poses, frame))}
 
     program = differentiate(trace(pose, {"q": shapes["q"], "d": shapes["v"]}), [("T", "d")], order="forward")
     still = np.zeros(shapes["v"])
     return trace(lambda q: {"dT_dq": inline(program, {"q": q, "d": still})["dT_dd"]}, {"q": shapes["q"]})
+
+
+def _displaced(mechanism: Mechanism, q: Array, d: Array) -> Array:
+    return displace(q, d, floating=mechanism.floating, balls=mechanism.ball_places)
 
 
 def _closed_form(mechanism: Mechanism, q: Array, v: Array, a: Array) -> dict[str, Array]:
@@ -117,7 +121,7 @@ def _differentiated_torque(mechanism: Mechanism) -> Program:
     """
 
     def torque(q: Array, d: Array, v: Array, a: Array) -> dict[str, Array]:
-        return {"tau": _torque(mechanism, displace(q, d, floating=mechanism.floating), v, a)}
+        return {"tau": _torque(mechanism, _displaced(mechanism, q, d), v, a)}
 
     shapes = argument_shapes(mechanism, "qva")
     moved = {"q": shapes["q"], "d": shapes["v"], "v": shapes["v"], "a": shapes["a"]}

@@ -12,6 +12,7 @@ without weights: on a chain of 64 joints it is three times as fast.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,7 +85,7 @@ def on_chain(
     ``jacobian_derivative``, ``frame_velocity`` and ``frame_acceleration``.
     """
     base_q, base_v = (7, 6) if mechanism.floating else (0, 0)
-    own_q = [*range(base_q), *(base_q + body for body in chain.bodies)]
+    own_q = [*range(base_q), *(place for body in chain.bodies for place in _places(mechanism, body))]
     own_v = [*range(base_v), *(base_v + body for body in chain.bodies)]
     moves = np.ones(len(own_v))
     if chain.shared:
@@ -116,6 +117,13 @@ def on_chain(
     return axes.rate(twist, J @ a[0] + dJ @ v, twist)
 
 
+def _places(mechanism: Mechanism, body: int) -> Sequence[int]:
+    """Return the indices in q of the joint of a body: of a ball joint the quaternion, at its first body."""
+    ball = mechanism.bodies[body].ball
+    first = mechanism.places[body + (6 if mechanism.floating else 0)]
+    return range(first, first + (1 if ball is None else 4 * (ball == 0)))
+
+
 def _jacobian(mechanism: Mechanism, poses: Poses, place: Array, v: Array | None = None) -> Array:
     """Return J (6, nv) of the only frame of `mechanism` in `local` or `world`, or dJ/dt at a velocity `v`.
 
@@ -136,8 +144,9 @@ def _jacobian(mechanism: Mechanism, poses: Poses, place: Array, v: Array | None 
         angular = z if is_rotation(mechanism, column, owner) else 0 * z
         linear = cross(z, lever) if is_rotation(mechanism, column, owner) else z
         if v is not None:
-            relative = twists[owner][1] - omega
-            at_origin = twists[owner][0] + cross(twists[owner][1], lever) - velocity
+            carrier = twists[owner if owner == ROOT else mechanism.axis_carriers[owner]]
+            relative = carrier[1] - omega
+            at_origin = carrier[0] + cross(carrier[1], lever) - velocity
             linear = cross(relative, linear) + cross(at_origin, angular)
             angular = cross(relative, angular)
         columns[:3, column], columns[3:, column] = linear, angular

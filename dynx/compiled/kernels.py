@@ -161,8 +161,11 @@ def compiles(mechanism: Mechanism, name: str) -> bool:
 
 
 def routines_evaluate(mechanism: Mechanism, name: str) -> bool:
-    """Check whether routines can evaluate a quantity: they solve no equations that mimic joints reduce."""
-    return name in TABLE_QUANTITIES and not (kernel_quantity(name).solves and mechanism.coupling is not None)
+    """Check whether routines can evaluate a quantity: they solve no equations that mimic joints reduce, and
+    have no ball joints."""
+    if mechanism.balls or name not in TABLE_QUANTITIES:
+        return False
+    return not (kernel_quantity(name).solves and mechanism.coupling is not None)
 
 
 def evaluate_quantity(

@@ -33,7 +33,8 @@ def reduce_rows(mechanism: Mechanism, A: Array) -> Array:
 
 def argument_shapes(mechanism: Mechanism, arguments: Iterable[str]) -> dict[str, tuple[int, ...]]:
     """Return the shapes of arguments such as q, v and tau in the coordinates of the model."""
-    coupling = mechanism.coupling
-    n = len(mechanism.bodies) if coupling is None else coupling.n_joints
-    nq, nv = (n + 7, n + 6) if mechanism.floating else (n, n)
+    nq, nv, coupling = mechanism.nq, mechanism.nv, mechanism.coupling
+    if coupling is not None:
+        followers = len(mechanism.bodies) - coupling.n_joints
+        nq, nv = nq - followers, nv - followers
     return {argument: (nq if argument == "q" else nv,) for argument in arguments}

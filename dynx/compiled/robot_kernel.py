@@ -17,7 +17,6 @@ import dynx.spatial
 from dynx.backends.evaluation import batch_rows, common_batch
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.model import Mechanism, Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.simd.cache import load_kernel, source_version
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
@@ -40,7 +39,6 @@ class RobotKernels:
 
     def __init__(self, model: Model, threads: int | None) -> None:
         """A batch is split over at most `threads` threads. Raises ArgumentError for an invalid number."""
-        refuse_ball_joints(model, "compiled code")
         self._model = model
         self.threads = checked_threads(threads)
         self._kernels: dict[object, Kernel] = {}

@@ -26,7 +26,7 @@ def _refusal(tree: Tree, what: str) -> str:
     joint = tree.ball_joints[0].name
     return (
         f"{shown(joint)} of {tree.name} is a ball joint, which {what} does not take; the backends "
-        "'reference', 'pinocchio' and 'mujoco' do"
+        "'reference', 'compiled', 'pinocchio' and 'mujoco' do"
     )
 
 

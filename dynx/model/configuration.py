@@ -21,7 +21,6 @@ from dynx.model.tree import Tree
 from dynx.spatial import branchless
 from dynx.spatial.branchless import FLOATS
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import quat_product
 from dynx.time_limit import not_counted
 
 Step = Callable[[object, object, object], int]
@@ -118,70 +117,36 @@ def integrate(tree: Tree, q: ArrayLike, v: ArrayLike) -> Floats:
     A floating base moves along the exponential of its body twist, and a ball joint turns along that of its
     angular velocity.
     """
-    if tree.ball_joints:
-        return _integrate_parts(tree, q, v)
-    if tree.floating and type(q) is type(v) is np.ndarray:
+    if tree.floating and not tree.ball_joints and type(q) is type(v) is np.ndarray:
         moved = np.empty(tree.nq)
         if _integration.function(q, v, moved) == _ACCEPTED:
             return moved
     q, v = checked_q(tree, q), checked_array("v", v, tree.nv)
-    if not tree.floating:
+    if not tree.quaternions:
         return q + v
-    if not q.ndim == v.ndim == 1:
-        return branchless.integrate(*_broadcast(q, v))
+    if tree.ball_joints or not q.ndim == v.ndim == 1:
+        from dynx.spatial.manifold import integrate as move  # most robots have no quaternions
+
+        return move(*_broadcast(q, v), floating=tree.floating, balls=tree.ball_places)
     start, step = q.tolist(), v.tolist()
     return np.array(branchless.moved(start[:7], step[:6], FLOATS) + list(map(add, start[7:], step[6:])))
 
 
 def difference(tree: Tree, q0: ArrayLike, q1: ArrayLike) -> Floats:
     """Return the velocity v (..., nv) with integrate(q0, v) = q1, whose rotation angles are at most pi."""
-    if tree.ball_joints:
-        return _subtract_parts(tree, q0, q1)
-    if tree.floating and type(q0) is type(q1) is np.ndarray:
+    if tree.floating and not tree.ball_joints and type(q0) is type(q1) is np.ndarray:
         velocity = np.empty(tree.nv)
         if _subtraction.function(q0, q1, velocity) == _ACCEPTED:
             return velocity
     q0, q1 = checked_q(tree, q0, "q0"), checked_q(tree, q1, "q1")
-    if not tree.floating:
+    if not tree.quaternions:
         return q1 - q0
-    if not q0.ndim == q1.ndim == 1:
-        return branchless.difference(*_broadcast(q0, q1))
+    if tree.ball_joints or not q0.ndim == q1.ndim == 1:
+        from dynx.spatial.manifold import difference as subtract  # most robots have no quaternions
+
+        return subtract(*_broadcast(q0, q1), floating=tree.floating, balls=tree.ball_places)
     start, end = q0.tolist(), q1.tolist()
     return np.array(branchless.twist_between(start[:7], end[:7], FLOATS) + list(map(sub, end[7:], start[7:])))
-
-
-def _integrate_parts(tree: Tree, q: ArrayLike, v: ArrayLike) -> Floats:
-    """Return `integrate` for a robot with ball joints: the base, then joint by joint."""
-    q, v = _broadcast(checked_q(tree, q), checked_array("v", v, tree.nv))
-    parts, in_q, in_v = [], 0, 0
-    if tree.floating:
-        parts, in_q, in_v = [branchless.integrate(q[..., :7], v[..., :6])], 7, 6
-    for joint in tree.coordinate_joints:
-        of_q, of_v = q[..., in_q : in_q + joint.n_positions], v[..., in_v : in_v + joint.n_rates]
-        if joint.type == "ball":
-            turned = quat_product(of_q, branchless.quat_exp(of_v))
-            parts.append(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
-        else:
-            parts.append(of_q + of_v)
-        in_q, in_v = in_q + joint.n_positions, in_v + joint.n_rates
-    return np.concatenate(parts, axis=-1)
-
-
-def _subtract_parts(tree: Tree, q0: ArrayLike, q1: ArrayLike) -> Floats:
-    """Return `difference` for a robot with ball joints: the base, then joint by joint."""
-    q0, q1 = _broadcast(checked_q(tree, q0, "q0"), checked_q(tree, q1, "q1"))
-    parts, at = [], 0
-    if tree.floating:
-        parts, at = [branchless.difference(q0[..., :7], q1[..., :7])], 7
-    for joint in tree.coordinate_joints:
-        start, end = (q[..., at : at + joint.n_positions] for q in (q0, q1))
-        if joint.type == "ball":
-            back = np.concatenate([-start[..., :3], start[..., 3:]], axis=-1)
-            parts.append(branchless.quat_log(quat_product(back, end)))
-        else:
-            parts.append(end - start)
-        at += joint.n_positions
-    return np.concatenate(parts, axis=-1)
 
 
 def clip(tree: Tree, q: ArrayLike) -> Floats:

@@ -165,6 +165,12 @@ class Mechanism:
         return tuple(k for k, body in enumerate(self.bodies) if body.ball == 0)
 
     @cached_property
+    def ball_places(self) -> tuple[int, ...]:
+        """Index in q at which the quaternion of each ball joint begins."""
+        base = 6 if self.floating else 0
+        return tuple(self.places[base + ball] for ball in self.balls)
+
+    @cached_property
     def has_mass(self) -> bool:
         """True if any body has mass."""
         return any(inertia.mass != 0 for inertia in (self.root, *(b.inertia for b in self.bodies)))

@@ -111,10 +111,14 @@ class Tree:
         )
 
     @cached_property
+    def ball_places(self) -> tuple[int, ...]:
+        """Index in q at which the quaternion of each ball joint begins."""
+        return tuple(self.position_index(joint.name) for joint in self.ball_joints)
+
+    @cached_property
     def quaternions(self) -> tuple[int, ...]:
         """Index in q at which each quaternion begins: that of a floating base, then those of ball joints."""
-        balls = [self.position_index(joint.name) for joint in self.ball_joints]
-        return tuple([3] * self.floating + balls)
+        return (3,) * self.floating + self.ball_places
 
     @cached_property
     def frames(self) -> tuple[Frame, ...]:

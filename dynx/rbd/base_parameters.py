@@ -2,11 +2,11 @@
 
 Joint torques do not determine all inertial parameters of a body: some may be assigned to the parent of its
 joint instead. For a revolute joint these are the parameters of mass distributed along the axis, which do not
-change when the body rotates; for a prismatic joint, rotational inertia without mass. Regrouped with the
-parent's, they leave three of the ten parameters of a body zero (six for a prismatic joint), as in Gautier and
-Khalil, Direct calculation of minimum set of inertial parameters of serial robots, 1990. The origin of a body
-frame may also lie anywhere on the joint axis: it is moved to where the vectors between successive origins
-have the fewest non-zero components.
+change when the body rotates; for a prismatic joint, rotational inertia without mass; for a ball joint, a mass
+at its centre. Regrouped with the parent's, they leave three of the ten parameters of a body zero (six for a
+prismatic joint, one for a ball joint), as in Gautier and Khalil, Direct calculation of minimum set of
+inertial parameters of serial robots, 1990. The origin of a body frame may also lie anywhere on the joint
+axis: it is moved to where the vectors between successive origins have the fewest non-zero components.
 
 In exact arithmetic, torque, mass matrix, energies, momentum and centre of mass of the whole robot stay the
 same functions of the same coordinates, and frames keep their names and poses. The inertia of a single body
@@ -37,7 +37,7 @@ def align_frames(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with new body frames, whose z axes are the axes of revolute joints.
 
     The origin is moved along the axis if that makes more components zero. The frame of a body on a
-    prismatic joint is that of its parent when the joint is at 0.
+    prismatic joint is that of its parent when the joint is at 0; that of a ball joint stays.
     """
     identity, zero = np.eye(3, dtype=int) + 0 * mechanism.gravity, 0 * mechanism.gravity
     # Pose (Q, o) of the new frame of each body in its old one.
@@ -50,7 +50,10 @@ def align_frames(mechanism: Mechanism) -> Mechanism:
         Q_parent, o_parent = frames[body.parent]
         # Pose of the joint in the parent's new frame.
         R, p = Q_parent.T @ body.R, Q_parent.T @ (body.p - o_parent)
-        if body.revolute:
+        if body.ball is not None:
+            Q, o = identity, zero
+            placed.append((body, R, p, body.axis))
+        elif body.revolute:
             child_offsets = [np.sum(child.p * body.axis) for child in children.get(index, ())]
             Q, o = rotation_to_axis(R, body.axis), _origin_shift(R, p, body.axis, child_offsets)
             placed.append((body, R @ Q, p + R @ o, Z_AXIS + zero))
@@ -62,7 +65,7 @@ def align_frames(mechanism: Mechanism) -> Mechanism:
         [body.inertia for body, *_ in placed], [frames[k] for k in range(len(placed))]
     )
     bodies = tuple(
-        Body(body.joint, body.parent, body.revolute, R, p, axis, inertia)
+        Body(body.joint, body.parent, body.revolute, R, p, axis, inertia, body.ball)
         for (body, R, p, axis), inertia in zip(placed, inertias, strict=True)
     )
     named_frames = tuple(
@@ -81,18 +84,23 @@ def regroup_inertias(mechanism: Mechanism) -> Mechanism:
     inertias = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(mechanism.bodies)}}
     for index in reversed(range(len(mechanism.bodies))):
         body = mechanism.bodies[index]
-        inertias[index], redundant = split_inertia(inertias[index], body.revolute)
+        inertias[index], redundant = split_inertia(inertias[index], body.revolute, body.ball is not None)
         inertias[body.parent] = inertias[body.parent] + redundant.transform(body.R, body.p)
     bodies = tuple(replace(body, inertia=inertias[k]) for k, body in enumerate(mechanism.bodies))
     return replace(mechanism, root=inertias[ROOT], bodies=bodies)
 
 
-def split_inertia(inertia: RigidInertia, revolute: bool) -> tuple[RigidInertia, RigidInertia]:
+def split_inertia(
+    inertia: RigidInertia, revolute: bool, ball: bool = False
+) -> tuple[RigidInertia, RigidInertia]:
     """Split an inertia into the part that stays with the body and the part that moves to its parent.
 
-    The body rotates about the z axis of its frame if it is `revolute`, and slides otherwise.
+    The body rotates about the z axis of its frame if it is `revolute`, about any axis through the origin if
+    it is on a `ball` joint, and slides otherwise.
     """
     mass, h, tensor = inertia.mass, inertia.first_moment, inertia.rotational_inertia
+    if ball:
+        return RigidInertia(0 * mass, h, tensor), RigidInertia(mass, 0 * h, 0 * tensor)
     if not revolute:
         return RigidInertia(mass, h, 0 * tensor), RigidInertia(0 * mass, 0 * h, tensor)
     xx, yy, zz = (inertia.second_moment_matrix[k, k] for k in range(3))

@@ -164,7 +164,9 @@ class Parameters:
         count, n = len(self._moving), len(self.of_joint)
         rows = values[..., values.shape[-1] - n * count :]
         base = np.zeros((*rows.shape[:-1], 6 if self.model.floating else 0))
-        columns = [rows[..., k::n] for k in range(n)]
+        # The numbers of a ball joint act about each of its three axes.
+        spread = [k for k, joint in enumerate(self._moving) for _ in range(joint.n_rates)]
+        columns = [rows[..., k::n][..., spread] for k in range(n)]
         springs, spring = None, columns[len(JOINT) :]
         if spring and (values.dtype == object or spring[0].any()):
             springs = springs_of(self.model.mechanism, *spring)

@@ -48,7 +48,7 @@ from dynx.simd.call_sequence import Integers
 from dynx.simd.cuts import CutStep, EngineCall, EngineCallTracer
 from dynx.simd.user_code.arrays import is_traced, symbol_array, traced_array
 from dynx.simd.user_code.numbers import as_symbol, as_traced, select
-from dynx.spatial.branchless import difference
+from dynx.spatial.manifold import difference
 from dynx.spatial.scalar import Array, Floats, clamp, tanh
 from dynx.steppers.forces import ExternalForce
 from dynx.trajectory.base import Setpoint
@@ -312,7 +312,8 @@ class LoopStep:
         else:
             q, v, a = scheme.moved(q, v, self._acceleration(mechanism, given, pushed, tau))
         q_reference = given["q_reference"]
-        error = abs(difference(q, q_reference) if self.model.floating else q_reference - q)
+        model = self.model
+        error = abs(difference(q, q_reference, floating=model.floating, balls=model.ball_places))
         max_error = np.array([x.maximum(e) for x, e in zip(given["max_error"], error, strict=True)])
         # An infinite torque makes the velocity infinite too, unless it was clamped.
         commanded = results.get("commanded")

@@ -17,7 +17,7 @@ import numpy as np
 from dynx.control.base import Measurement
 from dynx.model import Model
 from dynx.model.numbers import DIVERGENCE_SPEED
-from dynx.spatial.branchless import integrate
+from dynx.spatial.manifold import integrate
 from dynx.spatial.scalar import Array, Floats, sign
 
 MAX_SQUARED_SPEED = DIVERGENCE_SPEED**2
@@ -43,9 +43,11 @@ def measure(
 
 
 def _displaced(model: Model, q: Array, displacement: Array) -> Array:
-    if not model.floating:
+    if not model.quaternions:
         return np.asarray(q + displacement)
-    return integrate(q, displacement) if q.dtype == object else model.integrate(q, displacement)
+    if q.dtype == object:
+        return integrate(q, displacement, floating=model.floating, balls=model.ball_places)
+    return model.integrate(q, displacement)
 
 
 def at_limit(tau: Array, limit: Array) -> Array:

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dynx.spatial.scalar import Array, arctan, cos, sign, sin, sqrt
-from dynx.spatial.so3 import rotate, rotation_from_quat
 
 TINY = 1e-300
 """Term added to squared angles [rad^2] before division; rounding absorbs it for all but tiny angles."""
@@ -124,7 +123,7 @@ def twist_between(start: Components, end: Components, f: Functions) -> list[Any]
 
 def quat_exp(rotation_vector: Array) -> Array:
     """Return the unit quaternion (..., 4) of a rotation vector [rad] (..., 3)."""
-    x, y, z = _components(rotation_vector)
+    x, y, z = components(rotation_vector)
     half = 0.5 * sqrt(x * x + y * y + z * z + TINY)
     ratio = 0.5 * (sin(half) / half)
     return np.stack([ratio * x, ratio * y, ratio * z, cos(half)], axis=-1)
@@ -132,7 +131,7 @@ def quat_exp(rotation_vector: Array) -> Array:
 
 def quat_log(quat_xyzw: Array) -> Array:
     """Return the rotation vector [rad] (..., 3), of norm at most pi, of a quaternion of any non-zero norm."""
-    return np.stack(_rotation_vector(_components(quat_xyzw), ARRAYS), axis=-1)
+    return np.stack(_rotation_vector(components(quat_xyzw), ARRAYS), axis=-1)
 
 
 def rotation_log(R: Array) -> Array:
@@ -140,36 +139,8 @@ def rotation_log(R: Array) -> Array:
     return quat_log(_scaled_quat(R))
 
 
-def integrate(q: Array, v: Array) -> Array:
-    """Return `Model.integrate` for a floating base: q (..., nq) moved by v (..., nv) for unit time."""
-    base = moved(_components(q[..., :7]), _components(v[..., :6]), ARRAYS)
-    return np.concatenate([np.stack(base, axis=-1), q[..., 7:] + v[..., 6:]], axis=-1)
-
-
-def displace(q: Array, d: Array, *, floating: bool) -> Array:
-    """Return q (+) d (..., nq), `Model.integrate` to first order in d (..., nv).
-
-    Derivatives with respect to a configuration are taken with respect to d: with a floating base q has one
-    entry more than a velocity. Value and first derivatives are exact at d = 0. The base translates by
-    R d[:3] and rotates by the quaternion product of q with (d[3:6] / 2, 1).
-    """
-    if not floating:
-        return np.asarray(q + d)
-    x, y, z, w = (q[..., k] for k in range(3, 7))
-    a, b, c = (d[..., k] for k in range(3, 6))
-    change = [w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a, -x * a - y * b - z * c]
-    position = q[..., :3] + rotate(rotation_from_quat(q[..., 3:7]), d[..., :3])
-    quat = q[..., 3:7] + np.stack(change, axis=-1) * 0.5
-    return np.concatenate([position, quat, q[..., 7:] + d[..., 6:]], axis=-1)
-
-
-def difference(q0: Array, q1: Array) -> Array:
-    """Return `Model.difference` for a floating base: the v (..., nv) with integrate(q0, v) = q1."""
-    base = twist_between(_components(q0[..., :7]), _components(q1[..., :7]), ARRAYS)
-    return np.concatenate([np.stack(base, axis=-1), q1[..., 7:] - q0[..., 7:]], axis=-1)
-
-
-def _components(array: Array) -> list[Any]:
+def components(array: Array) -> list[Any]:
+    """Return the entries (...,) of an array (..., n)."""
     return [array[..., k] for k in range(array.shape[-1])]
 
 

@@ -141,8 +141,6 @@ REFUSED: dict[str, Callable[[Path], object]] = {
     "Scenario": lambda folder: dynx.Scenario(MODEL),
     "SceneRobot": lambda folder: dynx.world.SceneRobot("arm", MODEL),
     "read_scene": of_file(lambda path: dynx.world.read_scene(path)),
-    "parametric": lambda folder: dynx.parametric(MODEL),
-    "Derivatives": lambda folder: dynx.Derivatives(MODEL),
     "same_robot of models": lambda folder: dynx.same_robot(MODEL, STRAIGHT),
     "same_robot of files": of_file(lambda path: dynx.same_robot(path, path)),
     "diagnose a model": lambda folder: raised(dynx.diagnose(MODEL)),
@@ -162,6 +160,7 @@ COMMANDS_THAT_COMPUTE = (
     ("fd", "ROBOT", "--tau", "1,2,3,4"),
     ("mass", "ROBOT"),
     ("convert", "ROBOT", "--to", "sdf"),
+    ("agree", "ROBOT", "--backends", "reference,compiled"),
 )
 COMMANDS_THAT_REFUSE = (
     ("id", "ROBOT", "--v", "shoulder=1"),
@@ -171,7 +170,6 @@ COMMANDS_THAT_REFUSE = (
     ("doctor", "ROBOT"),
     ("same", "ROBOT", "ROBOT"),
     ("view", "ROBOT"),
-    ("agree", "ROBOT", "--backends", "reference,compiled"),
 )
 
 

@@ -18,7 +18,7 @@ from dynx.errors import (
     UnsupportedFeatureError,
 )
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model
-from dynx.model.ball_joints import refuse_ball_joints
+from dynx.model.ball_joints import refuse_ball_joints, refuse_ball_joints_of_backend
 from dynx.model.conversion import convert
 from dynx.spatial.so3 import quat_log, quat_product
 from dynx.testing.strategies import configurations, models, velocities
@@ -125,8 +125,8 @@ def test_faults_are_refused_by_name() -> None:
         Model.build("arm", LINKS, [HINGE, Joint("ball", "ball", "a", "b", limits=Limits(0.0, -1.0)), SLIDE])
     with pytest.raises(UnsupportedFeatureError, match="'ball' of arm is a ball joint, which this does not"):
         refuse_ball_joints(MODEL, "this")
-    with pytest.raises(EngineLimitError, match="the backend 'compiled' does not take"):
-        dynx.backend("compiled", MODEL)
+    with pytest.raises(EngineLimitError, match="the backend 'derived' does not take"):
+        refuse_ball_joints_of_backend(MODEL, "derived")
     with pytest.raises(UnsupportedFeatureError, match="which URDF does not take"):
         MODEL.to_urdf()
 
