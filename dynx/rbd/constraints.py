@@ -1,0 +1,416 @@
+"""Impulses of contacts, joint limits, dry friction and bilateral constraints in one step, for any scalar.
+
+The constraints of a step are m *rows*, each a velocity w of the step's end that an impulse x changes:
+w = c + G x, with the velocities c (m,) without impulses and the Delassus matrix G = J A^-1 J' (m, m), which
+is symmetric and positive semidefinite. Every row belongs to one of three kinds of sets.
+
+- *Unilateral*: x >= l, w >= 0, (x - l) w = 0. The normal of a contact and a joint limit have l = 0.
+- *Disk*: one or two rows with |x| <= r. Where |x| < r they stick, w = 0; else w = -s x with s >= 0, which is
+  the largest dissipation. The radius r is constant (dry friction of a joint), or a coefficient times the
+  impulse of a unilateral row: a circular Coulomb cone, torsional friction, rolling friction.
+- *Free*: w = 0 for any x: welds, points, joint couplings.
+
+This is the nonlinear complementarity problem of Signorini and Coulomb, without relaxation: contacts that
+slide do not separate (Le Lidec et al., Contact models in robotics: a comparative analysis, 2023). A
+speculative contact, whose gap phi may close in the step of length h, has c + phi / h in place of c.
+
+**Sweeps** (projected Gauss-Seidel) visit one set after the other: x becomes the point of the set closest to
+x - w / g, with the largest eigenvalue g of the set's block of G. A fixed point is a solution. One sweep is
+text for any scalar; `frozen_sweep` stops where the largest change is small, each lane of a kernel for itself.
+Sweeps converge linearly, and slowly where a heavy body rests on a light one.
+
+**Newton's method** ends what sweeps begin, on floats: the conditions above are equations F(x) = 0 with
+F = g (x - projection of x - w / g) in m/s, which are piecewise smooth (Alart and Curnier, A mixed formulation
+for frictional contact problems prone to Newton like solution methods, 1991). Redundant contacts make its
+matrix singular; a small multiple of g on its diagonal selects the impulses closest to the ones before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dynx.spatial.scalar import FLOAT64_EPS, Array, Floats, less, maximum, minimum, select, sqrt
+
+TINY = 1e-300
+"""Term that keeps quotients finite where both numbers are zero."""
+
+
+class Disk(NamedTuple):
+    """One or two rows of friction."""
+
+    rows: tuple[int, ...]
+    normal: int | None = None
+    """Unilateral row whose impulse is multiplied by the limit; None where the limit is the radius itself."""
+
+
+@dataclass(frozen=True)
+class ConstraintSets:
+    """Sets to which the m rows of a step belong, each row to one.
+
+    Numbers that may differ from step to step are arguments beside it: `limits` has an entry for each disk, a
+    coefficient of friction or a radius.
+    """
+
+    size: int
+    """Number m of rows."""
+    unilateral: tuple[int, ...] = ()
+    disks: tuple[Disk, ...] = ()
+    free: tuple[int, ...] = ()
+
+    @cached_property
+    def visits(self) -> tuple[tuple[str, int], ...]:
+        """Kind and number of each set in the order of a sweep: free rows and disks of constant radius, then
+        each unilateral row with its disks."""
+        first = [("free", row) for row in self.free]
+        first += [("disk", k) for k, disk in enumerate(self.disks) if disk.normal is None]
+        for row in self.unilateral:
+            first.append(("unilateral", row))
+            first += [("disk", k) for k, disk in enumerate(self.disks) if disk.normal == row]
+        return tuple(first)
+
+
+class Residuals(NamedTuple):
+    """Largest violation of each condition by impulses and the velocities that belong to them [m/s, or rad/s
+    for a row of rotation]."""
+
+    gap: Any
+    """Velocity against a unilateral row: of a contact that still closes beyond its gap."""
+    complementarity: Any
+    """Smaller of velocity and impulse of a unilateral row, the latter times its entry of G."""
+    friction: Any
+    """Distance of a disk's impulse from the one of largest dissipation, times its part of G."""
+    cone: Any
+    """Impulse outside of its disk, times its part of G."""
+    free: Any
+    """Velocity of a free row."""
+
+    @property
+    def largest(self) -> Any:
+        """Largest of them."""
+        most = self[0]
+        for each in self[1:]:
+            most = maximum(most, each)
+        return most
+
+
+class Solution(NamedTuple):
+    """Impulses of a step."""
+
+    impulses: Array
+    """x (m,) [N s or N m s]."""
+    velocities: Array
+    """w = c + G x (m,) [m/s or rad/s]."""
+    residuals: Residuals
+    iterations: int
+    """Number of sweeps and of Newton's steps together."""
+
+
+def scales(sets: ConstraintSets, G: Array) -> list[Any]:
+    """Return for each row the largest eigenvalue of its set's block of G, for any scalar."""
+    found: list[Any] = [G[i, i] + TINY for i in range(sets.size)]
+    for disk in sets.disks:
+        if len(disk.rows) == 2:
+            i, j = disk.rows
+            mean, half, cross = 0.5 * (G[i, i] + G[j, j]), 0.5 * (G[i, i] - G[j, j]), G[i, j]
+            found[i] = found[j] = mean + _root(half * half + cross * cross) + TINY
+    return found
+
+
+def sweep(
+    sets: ConstraintSets,
+    G: Array,
+    g: Sequence[Any],
+    limits: Sequence[Any] | Array,
+    floors: Sequence[Any] | Array,
+    impulses: Array,
+    velocities: Array,
+) -> tuple[Array, Array, Any]:
+    """Visit every set once; return impulses (m,), velocities (m,) and the largest change [m/s], for any
+    scalar.
+
+    `g` are the `scales`, `limits` the numbers of the disks, and `floors` (m,) the least impulses of the
+    unilateral rows, which other rows ignore. The change is that of an impulse times its scale.
+    """
+    x: list[Any] = list(impulses)
+    w, change = velocities, 0.0
+
+    def apply(row: int, new: Any) -> None:
+        nonlocal w, change
+        step = new - x[row]
+        x[row] = new
+        w = w + G[:, row] * step
+        change = maximum(change, abs(step) * g[row])
+
+    for kind, number in sets.visits:
+        if kind == "free":
+            apply(number, x[number] - w[number] / g[number])
+        elif kind == "unilateral":
+            apply(number, maximum(floors[number], x[number] - w[number] / g[number]))
+        else:
+            rows = sets.disks[number].rows
+            wanted = [x[row] - w[row] / g[row] for row in rows]
+            share = _share(_radius(sets.disks[number], limits[number], x), wanted)
+            for row, each in zip(rows, wanted, strict=True):
+                apply(row, share * each)
+    return np.array(x, dtype=w.dtype), w, change
+
+
+def frozen_sweep(
+    sets: ConstraintSets,
+    G: Array,
+    g: Sequence[Any],
+    limits: Sequence[Any] | Array,
+    floors: Sequence[Any] | Array,
+    state: tuple[Array, Array, Any],
+    tolerance: Any,
+) -> tuple[Array, Array, Any]:
+    """Visit every set once if the last change of `state` was above the tolerance; otherwise return `state`.
+
+    The state is what `sweep` returns; its change is infinite at first. Without a branch, so that a lane of a
+    kernel that has finished keeps its bits whatever its neighbours do.
+    """
+    goes_on = less(tolerance, state[2])
+    swept = sweep(sets, G, g, limits, floors, state[0], state[1])
+    x, w = (
+        np.array([select(goes_on, a, b) for a, b in zip(new, old, strict=True)], dtype=new.dtype)
+        for new, old in zip(swept[:2], state[:2], strict=True)
+    )
+    return x, w, select(goes_on, swept[2], state[2])
+
+
+def residuals(
+    sets: ConstraintSets,
+    g: Sequence[Any],
+    limits: Sequence[Any] | Array,
+    floors: Sequence[Any] | Array,
+    impulses: Array,
+    velocities: Array,
+) -> Residuals:
+    """Return the violation of each condition, for any scalar."""
+    gap: Any = 0.0
+    complementarity: Any = 0.0
+    friction: Any = 0.0
+    cone: Any = 0.0
+    free: Any = 0.0
+    for row in sets.unilateral:
+        w = velocities[row]
+        gap = maximum(gap, -w)
+        least = minimum(w, g[row] * (impulses[row] - floors[row]))
+        complementarity = maximum(complementarity, abs(least))
+    for number, disk in enumerate(sets.disks):
+        rows, scale = disk.rows, g[disk.rows[0]]
+        radius = _radius(disk, limits[number], impulses)
+        held = [impulses[row] for row in rows]
+        wanted = [x - velocities[row] / scale for x, row in zip(held, rows, strict=True)]
+        share = _share(radius, wanted)
+        missed = [x - share * y for x, y in zip(held, wanted, strict=True)]
+        friction = maximum(friction, scale * _norm(missed))
+        cone = maximum(cone, scale * (_norm(held) - radius))
+    for row in sets.free:
+        free = maximum(free, abs(velocities[row]))
+    return Residuals(gap, complementarity, friction, cone, free)
+
+
+def _radius(disk: Disk, limit: Any, x: Sequence[Any] | Array) -> Any:
+    return limit if disk.normal is None else limit * maximum(x[disk.normal], 0.0)
+
+
+def _share(radius: Any, wanted: Sequence[Any]) -> Any:
+    """Return the factor by which a vector is shortened to at most `radius`."""
+    return minimum(1.0, radius / (_norm(wanted) + TINY))
+
+
+def _norm(vector: Sequence[Any]) -> Any:
+    if len(vector) == 1:
+        return abs(vector[0])
+    return _root(vector[0] * vector[0] + vector[1] * vector[1])
+
+
+def _root(x: Any) -> Any:
+    # NumPy takes ten times as long for a float.
+    return math.sqrt(x) if isinstance(x, float) else sqrt(x)[()]
+
+
+# -- floats -----------------------------------------------------------------------------------
+
+
+TOLERANCE = 1e-12
+"""Largest residual [m/s or rad/s] at which impulses on floats count as solved."""
+
+ROUNDING = 16.0 * FLOAT64_EPS
+"""Residual relative to the largest sum of |G| |x| that is rounding."""
+
+PROXIMAL = 1e-9
+"""Part of g on the diagonal of Newton's matrix, which redundant contacts make singular."""
+
+NEWTON_STEPS = 25
+"""Number of Newton's steps from one start."""
+
+CAUTIOUS_PROXIMAL = 1e-2
+"""The same part in every third step from `CAUTIOUS_FROM` on, which ends cycles between sets of modes."""
+
+CAUTIOUS_FROM = 10
+
+ATTEMPTS = ((0, 1.0), (10, 0.3), (10, 3.0), (20, 1.0), (20, 0.3), (40, 3.0), (40, 1.0), (80, 0.3), (80, 3.0))
+"""Number of sweeps before each attempt of Newton's method, and the factor of g in its projections. The factor
+changes no solution, but the modes between which an attempt that failed has cycled."""
+
+
+def solve(
+    sets: ConstraintSets,
+    G: Floats,
+    c: Floats,
+    limits: Floats,
+    *,
+    floors: Floats | None = None,
+    start: Floats | None = None,
+    tolerance: float = TOLERANCE,
+) -> Solution:
+    """Return the impulses of a step on floats, from a warm start (m,) or zero.
+
+    Newton's method begins at the start; where it does not converge in a few steps, sweeps improve the start,
+    and it begins again. The residuals tell how well the best attempt did. Results depend on the arguments
+    alone.
+    """
+    floors = np.zeros(sets.size) if floors is None else floors
+    at: Floats = np.zeros(sets.size) if start is None else start
+    numbers = scales(sets, G)
+    newton = _Newton(sets, G, c, np.array(numbers, dtype=np.float64), limits, floors)
+    rounding = ROUNDING * np.abs(G)
+    best, least, taken = at, math.inf, 0
+    for sweeps, factor in ATTEMPTS:
+        w: Floats = c + G @ at
+        for _ in range(sweeps):
+            at, w, _ = sweep(sets, G, numbers, limits, floors, at, w)
+        x = at
+        for count in range(NEWTON_STEPS):
+            cautious = count >= CAUTIOUS_FROM and count % 3 == 0
+            error, step = newton.step(x, factor, CAUTIOUS_PROXIMAL if cautious else PROXIMAL)
+            if error < least:
+                best, least = x, error
+            if step is None or error <= tolerance:
+                break
+            x = x + step
+        taken += sweeps + count
+        if least <= max(tolerance, float((rounding @ np.abs(best)).max(initial=0.0))):
+            break
+    w = c + G @ best
+    return Solution(best, w, residuals(sets, numbers, limits, floors, best, w), taken)
+
+
+def rebound(
+    sets: ConstraintSets,
+    G: Floats,
+    c: Floats,
+    limits: Floats,
+    plastic: Solution,
+    restitution: Floats,
+    *,
+    tolerance: float = TOLERANCE,
+) -> Solution:
+    """Return the impulses of impacts that restore a part of the impulses of compression, on floats.
+
+    `plastic` is the solution without restitution, whose unilateral impulses are those of compression. By
+    Poisson's hypothesis a unilateral row has at least 1 + e times its impulse of compression, with e in
+    `restitution` (m,); friction is within the cone of the whole impulse. For central impacts that is Newton's
+    law. Without friction the work x . (c + w) / 2 of the impulses is at most zero for any e: with the
+    impulses d of restitution, d' G d = sum of e x w over the rows that touch, at most x' G d, and by
+    Cauchy-Schwarz at most x' G x.
+    """
+    floors = np.zeros(sets.size)
+    rows = list(sets.unilateral)
+    floors[rows] = (1.0 + restitution[rows]) * np.maximum(plastic.impulses[rows], 0.0)
+    return solve(sets, G, c, limits, floors=floors, start=plastic.impulses, tolerance=tolerance)
+
+
+class _Newton:
+    """Newton's method for F(x) = 0, with F in m/s or rad/s."""
+
+    def __init__(
+        self, sets: ConstraintSets, G: Floats, c: Floats, g: Floats, limits: Floats, floors: Floats
+    ) -> None:
+        self._G, self._c, self._g = G, c, g
+        self._unilateral = np.array(sets.unilateral, dtype=np.intp)
+        self._floors = floors[self._unilateral]
+        self._disks = [disks for rows in (1, 2) if (disks := _Disks(sets, limits, rows)).count]
+
+    def step(self, x: Floats, factor: float, proximal: float) -> tuple[float, Floats | None]:
+        """Return the largest entry of F at x (m,), whose projections are those of x - w / (factor g), and
+        Newton's step; None where there is no finite one."""
+        G, g = self._G, factor * self._g
+        w = self._c + G @ x
+        wanted = x - w / g
+        F, J = w.copy(), G.copy()
+        # Impulses of unilateral rows by projection, and 1 where they follow from the others.
+        projected, follows = np.zeros(len(x)), np.zeros(len(x))
+        rows = self._unilateral
+        held = np.maximum(wanted[rows], self._floors)
+        inactive = rows[wanted[rows] <= self._floors]
+        projected[rows], follows[rows], follows[inactive] = held, 1.0, 0.0
+        F[rows] = g[rows] * (x[rows] - held)
+        J[inactive] = 0.0
+        J[inactive, inactive] = g[inactive]
+        for disks in self._disks:
+            disks.add(F, J, x, wanted, projected, follows, G, g)
+        error = float(np.abs(F).max(initial=0.0)) / min(factor, 1.0)
+        J.flat[:: len(x) + 1] += proximal * self._g
+        try:
+            step = np.linalg.solve(J, -F)
+        except np.linalg.LinAlgError:
+            return error, None
+        return error, step if np.isfinite(step).all() else None
+
+
+class _Disks:
+    """Disks with the same number of rows, as arrays."""
+
+    def __init__(self, sets: ConstraintSets, limits: Floats, rows: int) -> None:
+        chosen = [k for k, disk in enumerate(sets.disks) if len(disk.rows) == rows]
+        self.count = len(chosen)
+        self._rows = np.array([sets.disks[k].rows for k in chosen], dtype=np.intp).reshape(-1, rows)
+        normals = [sets.disks[k].normal for k in chosen]
+        self._coupled = np.array([each is not None for each in normals], dtype=np.float64)
+        self._normals = np.array([0 if each is None else each for each in normals], dtype=np.intp)
+        self._limits = np.asarray(limits, dtype=np.float64)[chosen]
+
+    def add(
+        self,
+        F: Floats,
+        J: Floats,
+        x: Floats,
+        wanted: Floats,
+        projected: Floats,
+        follows: Floats,
+        G: Floats,
+        g: Floats,
+    ) -> None:
+        """Write the entries of F (m,) and the rows of J (m, m) of disks that slip; those of disks that stick
+        are there."""
+        y = wanted[self._rows]
+        norm = np.sqrt((y * y).sum(axis=1))
+        radius = np.where(self._coupled > 0.0, projected[self._normals], 1.0) * self._limits
+        slips = norm > radius
+        if not slips.any():
+            return
+        rows, y, norm, radius = self._rows[slips], y[slips], norm[slips], radius[slips]
+        normals = self._normals[slips]
+        u, scale = y / norm[:, None], g[rows[:, 0]]
+        F[rows] = scale[:, None] * (x[rows] - radius[:, None] * u)
+        # The radius changes with the impulse of the normal row.
+        dr = np.zeros((len(rows), len(x)))
+        grows = self._limits[slips] * self._coupled[slips] * follows[normals]
+        each = np.arange(len(rows))
+        dr[each, normals] = grows
+        dr -= (grows / g[normals])[:, None] * G[normals]
+        dy = -G[rows] / scale[:, None, None]
+        dy[each[:, None], np.arange(rows.shape[1]), rows] += 1.0
+        turned = dy - u[:, :, None] * np.einsum("ki,kij->kj", u, dy)[:, None, :]
+        derivative = -u[:, :, None] * dr[:, None, :] - (radius / norm)[:, None, None] * turned
+        derivative[each[:, None], np.arange(rows.shape[1]), rows] += 1.0
+        J[rows] = scale[:, None, None] * derivative
