@@ -120,7 +120,7 @@ class NoClosedFormError(ArgumentError):
 
     @property
     def alternatives(self) -> str:
-        """Clause that names the remedies after the first, of many three; empty without others."""
+        """Clause that names the remedies after the first, at most three; empty if there is only one."""
         _, *sets = self.remedies
         listed = sets if len(sets) <= 4 else sets[:3]
         names = ", ".join(" and ".join(joints) for joints in listed)

@@ -172,10 +172,10 @@ class ClassRegistry(Generic[Kind]):
         return tuple(dict.fromkeys([*self.built_in, *self._registered, *points]))
 
     def register(self, name: str, loader: Callable[[], type[Kind]]) -> None:
-        """Add a class of the running program; `loader()` returns it when it is first looked up.
+        """Add a class of the running program; dynx calls `loader()`, which returns it, at the first use.
 
-        Raises ArgumentError for a name that is taken: a class is never replaced. Packages offer their classes
-        by entry points instead.
+        Raises ArgumentError for a name that is taken: a class is never replaced. Installed packages add their
+        classes by entry points.
         """
         if not isinstance(name, str) or not name:
             raise ArgumentError(f"a {self._word}'s name is {shown(name)}; wanted a str that is not empty")
@@ -190,7 +190,7 @@ class ClassRegistry(Generic[Kind]):
         self._registered[name] = loader
 
     def unregister(self, name: str) -> None:
-        """Remove a class that `register` added; raises `unknown` for any other name."""
+        """Remove a class that `register` added. Raises the error for an unknown name otherwise."""
         if name not in self._registered:
             raise self._unknown(
                 f"no {self._word} {shown(name)} was registered{nearest(name, self._registered)}"

@@ -68,12 +68,12 @@ def agree(
 ) -> AgreementReport:
     """Compare the results of backends on a robot.
 
-    `model` is a `Model` or whatever `dynx.load` takes. `backends` are names (default: all that are installed)
-    or backends made of this model, which stay open; a single one is compared with the referee and with
-    itself. dynx compares every quantity pairwise at `samples` states that follow from `seed`, and with the
-    50-digit referee at `referee_samples` of these states. It compares quantities that an engine computes
-    itself with those that dynx derives from the engine's poses and inverse dynamics. It also tests each
-    backend against the identities of mechanics. `progress` is called with the name of each step.
+    `model` is a `Model` or whatever `dynx.load` takes. `backends` are names (default: all installed backends)
+    or backends made of this model, which dynx does not close. dynx compares every quantity pairwise at
+    `samples` states that follow from `seed`, and with the 50-digit referee at `referee_samples` of these
+    states. It compares quantities that an engine computes itself with those that dynx derives from the
+    engine's poses and inverse dynamics. It also tests each backend against the identities of mechanics.
+    `progress` is called with the name of each step.
 
     A robot that cannot be read, or that a backend refuses, gives a report with `error` set. Raises
     ArgumentError for arguments that are invalid for every robot, UnknownBackendError and

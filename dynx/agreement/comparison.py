@@ -92,7 +92,7 @@ class Comparison:
 
     `pair` joins two names by ``~``: two backends, or a backend and ``referee`` (50 digits) or ``derived``
     (results that dynx derives from that engine's own poses and inverse dynamics). `max_rel_error` is the
-    largest error over its natural magnitude (`dynx.agreement.magnitudes`).
+    largest error divided by the natural magnitude of the quantity (`dynx.agreement.magnitudes`).
     """
 
     quantity: str

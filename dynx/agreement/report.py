@@ -127,7 +127,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class LoadFailure:
-    """The error for which a robot, or a backend for it, could not be used."""
+    """The error because of which a robot, or a backend of a robot, could not be used."""
 
     type: str
     message: str
@@ -141,7 +141,7 @@ class AgreementReport:
     """The agreement of backends on one robot; true in a condition if they agree.
 
     `quantities` are comparisons of results, `identities` checks of each backend alone, and `suspects` the
-    backends that are probably wrong where results differ. Where the robot was refused, `error` is set and
+    backends that are probably wrong where results differ. If the robot was refused, `error` is set and
     nothing is compared.
     """
 
@@ -289,7 +289,7 @@ def refused_report(
 def results_document(
     reports: Iterable[AgreementReport], not_done: Sequence[str] = (), left_out: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Return the JSON document of many reports, described at the head of this file.
+    """Return the JSON document of many reports, as `dynx agree --json` writes it.
 
     `not_done` names the robots of an interrupted run that have no report, `left_out` those in xacro below a
     directory.

@@ -45,7 +45,7 @@ class Backend(QuantityCalls):
     - ``"local"``: the frame's origin and axes
     - ``"world"``: the world's origin and axes (the spatial Jacobian)
 
-    `point` (3,) [m], in the frame's axes, moves the origin of the first two.
+    `point` (3,) [m], in the frame's axes, replaces the frame's origin in the first two.
 
     `joint_dynamics=True` adds the armature, viscous damping, Coulomb friction and springs of the joints,
     which every backend computes alike. It adds

@@ -70,7 +70,7 @@ class JointFriction:
         joint_friction: Coefficients = True,
         friction_slip: float = 0.0,
     ) -> JointFriction:
-        """Return the friction of the options of a simulation, which errors name."""
+        """Return the friction of the options of a simulation. Errors name the option."""
         refuse_other_than_model(model)
         made = cls.__new__(cls)
         slip = checked_slip("friction_slip", friction_slip)

@@ -115,7 +115,7 @@ class Session:
                 implementation.close()
 
     def measure_machine(self, threads: int) -> None:
-        """Measure the peaks on a number of threads and store them in `peaks`."""
+        """Measure the peak rates of the machine on a number of threads, and store them in `peaks`."""
         self.peaks[threads] = self._measure_peak(threads)
 
     @checks_types

@@ -71,8 +71,8 @@ class ForwardDynamicsDerivatives(NamedTuple):
 class Derivatives:
     """Partial derivatives for one robot, of single samples and of batches.
 
-    Arrays are float64 with leading batch axes that broadcast, as in `Backend`. The derivative of f by q is
-    that of f(model.integrate(q, d)) by the displacement d (nv,) at d = 0. For a floating base d is a
+    Arrays are float64 with leading batch axes that broadcast, as in `Backend`. The derivative of f(q) is that
+    of f(model.integrate(q, d)) with respect to the displacement d (nv,) at d = 0. For a floating base d is a
     translation and a rotation in the axes of the base; for joints these are ordinary partial derivatives. The
     unit is that of f divided by that of the variable.
 
@@ -95,7 +95,8 @@ class Derivatives:
     def inverse_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike
     ) -> InverseDynamicsDerivatives:
-        """Return the derivatives of tau = M a + bias by q, v and a; the last is the mass matrix."""
+        """Return the derivatives of tau = M a + bias with respect to q, v and a; the last is the mass
+        matrix."""
         arrays = self._checked(q, v, a, "a")
         if programs.pair_count(self.model.mechanism) > MAX_COMPILED_PAIRS:
             return self._by_routines(arrays)
@@ -105,8 +106,8 @@ class Derivatives:
     def forward_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike
     ) -> ForwardDynamicsDerivatives:
-        """Return the derivatives of a = M^-1 (tau - bias) by q, v and tau; the last is the inverse of the
-        mass matrix.
+        """Return the derivatives of a = M^-1 (tau - bias) with respect to q, v and tau; the last is the
+        inverse of the mass matrix.
 
         Raises SingularMassMatrixError, which names the joints, if nothing that a joint moves has inertia.
         """
@@ -128,7 +129,8 @@ class Derivatives:
 
     @checks_types
     def forward_kinematics_derivative(self, q: ArrayLike, frame: str) -> Floats:
-        """Return the derivative of T_world_frame by q (..., 4, 4, nv); the last axis counts entries of v."""
+        """Return the derivative of T_world_frame with respect to q (..., 4, 4, nv); the last axis counts
+        entries of v."""
         index = self.model.frame_index(frame)
         program = partial(programs.pose_derivative, frame=index)
         (derivative,) = self._evaluate(("pose", index), program, [self._arguments.q(q)])

@@ -126,7 +126,7 @@ class ParametricDynamics:
         """Return M with armature, r and the coefficients of one sample, for arrays of symbols in a trace.
 
         The acceleration solves M a = r minus the torque of damping and dry friction; r has the torque of
-        springs. The coefficients are None if they are no parameters.
+        springs. The coefficients of damping and dry friction are None if they are no parameters.
         """
         mechanism, joints = self._with(parameters), self.parameters.joints(parameters)
         bias = _inverse_dynamics(mechanism, None, q, v, np.zeros(len(v)))

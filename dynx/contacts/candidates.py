@@ -17,9 +17,9 @@ SUBSTEPS = "substeps"
 class SettingsChange:
     """Changes of one setting of an engine, or of several at once, tried one after the other.
 
-    `values` has as many values for each setting, each farther from the default than the one before. A numeric
-    setting of positive values, where it is the first, may make an error fall in proportion; any other has to
-    remove it.
+    `values` has the same number of values for each setting, each farther from the default than the one
+    before. If the first setting has positive numbers, it may make an error fall in proportion. Any other
+    setting has to remove the error.
     """
 
     values: Mapping[str, tuple[Any, ...]]

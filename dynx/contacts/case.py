@@ -139,13 +139,14 @@ unregister = _cases.unregister
 
 @checks_types
 def find_case(name: str) -> ContactCase:
-    """Return the case of that name; UnknownNameError where nobody provides it."""
+    """Return the case of that name. Raises UnknownNameError if there is none."""
     return _cases.find(name)()
 
 
 @checks_types
 def find_cases(names: Sequence[str] | None = None) -> tuple[ContactCase, ...]:
-    """Return the cases of these names, or all. ArgumentError for one name, which is no sequence of them."""
+    """Return the cases of these names, or all. Raises ArgumentError for a single name instead of a
+    sequence."""
     if isinstance(names, str):
         raise ArgumentError(f"names is {shown(names)}; wanted a list of names")
     return tuple(find_case(name) for name in (case_names() if names is None else names))

@@ -98,7 +98,7 @@ class Conformance:
 
     @checks_types
     def count(self, kind: VerdictKind, engine: str | None = None) -> int:
-        """Return the number of figures with a verdict, of one engine or of all."""
+        """Return the number of figures with this verdict, of one engine or of all."""
         if kind not in VERDICTS:
             raise UnknownNameError(f"no kind {shown(kind)}{nearest(kind, VERDICTS)}")
         return self.counts(engine)[kind]
@@ -133,13 +133,13 @@ def conform(
 ) -> Conformance:
     """Measure engines against mechanics: every trial of every case, in every engine, at every step.
 
-    Engines and cases are all that are installed unless named. Steps are 1e-6 to 0.1 s; with a single one no
-    error can fall. `settings` are those of `World` by engine, `substeps` included; `candidates` are the
-    settings to which errors may be attributed. Runs take place in `jobs` processes (default: one for each
-    processor). dynx records a run that crashes or takes longer than `timeout` [s]. With 0 jobs the runs take
-    place in this process, which a crash ends. `progress(done, total)` is called after each run; the total
-    grows when errors have to be attributed. With `interruptible`, KeyboardInterrupt ends the runs, and the
-    results so far are returned.
+    By default all installed engines and all cases take part. Steps are 1e-6 to 0.1 s; with a single step dynx
+    cannot check whether an error falls with the step. `settings` are those of `World` by engine, `substeps`
+    included; `candidates` are the settings to which errors may be attributed. Runs take place in `jobs`
+    processes (default: one for each processor). dynx records a run that crashes or takes longer than
+    `timeout` [s]. With 0 jobs the runs take place in this process, which a crash ends. `progress(done,
+    total)` is called after each run; the total grows when errors have to be attributed. With `interruptible`,
+    KeyboardInterrupt ends the runs, and the results so far are returned.
 
     Raises the errors of `World` for engines and settings, UnknownNameError for the name of a case,
     ArgumentError for steps and for a case that cannot be used.

@@ -74,9 +74,9 @@ class Controller(ABC, Generic[ControllerState]):
 
     A controller of your own is a subclass with `torque`, and with `initial_state` if it has a state. It is
     best a frozen dataclass, which is compared, printed and serialised by its fields. If it modifies the
-    torque of another controller, that is its attribute `inner`; if it evaluates a model, it does so by an
-    attribute that `model_dynamics` makes. It must not change its own attributes. Several threads may share it
-    if they may share its backend.
+    torque of another controller, the other controller is its attribute `inner`. If it evaluates a model, the
+    result of `model_dynamics` is one of its attributes. It must not change its own attributes. Several
+    threads may share it if they may share its backend.
     """
 
     lead: int = 0
@@ -114,7 +114,8 @@ class Controller(ABC, Generic[ControllerState]):
     def torque(
         self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
     ) -> tuple[Floats, ControllerState]:
-        """Return the torque tau (nv,) to apply until the next control step, and the state then.
+        """Return the torque tau (nv,) to apply until the next control step, and the controller state for that
+        step.
 
         The given arrays must not be modified; returned arrays must be new or never change.
         """
@@ -193,10 +194,10 @@ class Controller(ABC, Generic[ControllerState]):
 class ModelBased(Controller[ControllerState]):
     """A controller that evaluates the dynamics of its model with a backend.
 
-    With `joint_dynamics` it knows the damping, dry friction, armature and springs of the description, as
-    quantities of backends do with the option of that name. By default it computes with rigid bodies alone.
-    Dry friction is overcome along the velocity of the setpoint, which moves joints that stick and cannot make
-    them unstable. It commands every coordinate, so a floating base, which has no motor, is refused.
+    With `joint_dynamics` it includes the damping, dry friction, armature and springs of the description, as a
+    backend does with the option of that name. By default it computes with rigid bodies alone. It compensates
+    dry friction along the velocity of the setpoint, which moves joints that stick and cannot make them
+    unstable. It commands every coordinate, so a floating base, which has no motor, is refused.
     """
 
     model: Model

@@ -25,8 +25,8 @@ class ComputedTorque(ModelBased[None], pure=True):
 
     With an exact model the error of each coordinate obeys e'' + kd e' + kp e = 0, independent of the others
     (Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 8.3). In discrete time an error of
-    about dt a* kd / (2 kp) remains, which `DiscreteComputedTorque` removes. With `joint_dynamics` ID includes
-    those of the description.
+    about dt a* kd / (2 kp) remains, which `DiscreteComputedTorque` does not have. With `joint_dynamics` ID
+    includes the joint dynamics of the description.
     """
 
     kp: Floats = gain("1/s^2")

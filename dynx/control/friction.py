@@ -41,10 +41,8 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
         slip: float = SLIP,
         speed: str = "measured",
     ) -> None:
-        """The coefficients are those of `JointFriction`. Without both they are those of the description.
-
-        Of one alone the other is not compensated, because a plant without damping is driven away by a torque
-        along its speed.
+        """The coefficients are as in `JointFriction`. If you give neither, both are those of the description.
+        If you give one, the other is 0, because a torque along the speed drives a plant without damping away.
         """
         if damping is None and friction is None:
             damping = friction = True

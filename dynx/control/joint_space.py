@@ -185,7 +185,7 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
     """PD control with gravity compensation, so that there is no error at rest.
 
     Globally asymptotically stable for a constant setpoint (Takegaki and Arimoto 1981; Siciliano et al.,
-    Robotics, section 8.5.1). With `joint_dynamics` it overcomes springs as it does gravity, and damping and
+    Robotics, section 8.5.1). With `joint_dynamics` it also compensates the torque of springs, and damping and
     friction at the setpoint's velocity.
     """
 

@@ -101,7 +101,8 @@ class MotorLag(_StatefulWrapper, pure=True):
         )
 
     def initial_state(self) -> Floats:
-        """Return the torque at the start, as often as torques are under way, and as that of the motor."""
+        """Return the state before the first step, in which all torques under way and that of the motor are
+        `initial`."""
         return self._joined(np.tile(self.initial, self._steps + 1))
 
     @checks_types
@@ -135,8 +136,9 @@ class Encoders(_StatefulWrapper, pure=True):
     """Another controller that measures by encoders: positions are whole multiples of `resolution`.
 
     Velocities are differences of two such positions, over `control_dt`; in the first step the velocity is 0.
-    Noise and delay of the simulation come before. The state is the last position (n,) in multiples, and
-    whether there is one. The pose and the twist of a floating base are not measured by encoders.
+    The simulation applies its noise and delay before the encoders round. The state is the last position (n,)
+    in multiples, and whether there is one. The pose and the twist of a floating base are not measured by
+    encoders.
     """
 
     control_dt: float = parameter("s")
@@ -146,7 +148,7 @@ class Encoders(_StatefulWrapper, pure=True):
         """`resolution` [rad or m] is one number or one for each joint (n,): 2 pi / counts of an encoder on
         the side of the joint; `control_dt` [s] is the control step.
 
-        Raises GainError for a resolution that is not above 0, ArgumentError for another control step.
+        Raises GainError for a resolution that is not above 0, ArgumentError for an invalid control step.
         """
         dt = self._with_step(inner, control_dt)
         n = len(inner.model.joint_names)
@@ -156,7 +158,7 @@ class Encoders(_StatefulWrapper, pure=True):
         self._set(control_dt=dt, resolution=steps)
 
     def initial_state(self) -> Floats:
-        """Return no last position: zeros, and 0 for that there is none."""
+        """Return the state before the first step: zeros, and 0 because there is no last position."""
         return self._joined(np.zeros(len(self.resolution) + 1))
 
     @checks_types

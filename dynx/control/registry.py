@@ -82,7 +82,8 @@ def to_document(controller: Controller[Any]) -> dict[str, Any]:
 
 @checks_types
 def from_document(model: Model, document: Mapping[str, Any]) -> Controller[Any]:
-    """Return the controller of `model` that `to_document` wrote. Raises ArgumentError for other documents."""
+    """Return the controller of `model` that `controller_to_document` wrote. Raises ArgumentError for other
+    documents."""
     if "controller" not in document:
         raise ArgumentError(f"document is {shown(document)}, which lacks the name of its controller")
     arguments = {name: _read(model, value) for name, value in document.items() if name != "controller"}

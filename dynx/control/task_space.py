@@ -66,8 +66,8 @@ class Impedance(TaskSpace[None], pure=True):
     """tau = J' (K e + D e') + g(q) - B v, without shaping the inertia.
 
     It is passive for a reference at rest: it supplies no energy to its environment (Hogan 1985; Siciliano et
-    al., Robotics, section 9.2). A steady force F displaces the frame by F / K. With `joint_dynamics` damping
-    and friction are overcome at the setpoint's velocity.
+    al., Robotics, section 9.2). A steady force F displaces the frame by F / K. With `joint_dynamics` it
+    compensates damping and friction at the setpoint's velocity.
     """
 
     stiffness: Floats = gain("N/m, N m/rad")
@@ -138,9 +138,8 @@ class OperationalSpace(TaskSpace[None], pure=True):
         joint_dynamics: bool = False,
         backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
-        """Gains of the frame (6,), linear then angular, or one number; of the posture (nv,).
-
-        Units as those of `ComputedTorque`. Raises GainError, UnknownNameError for the frame.
+        """Gains of the frame are (6,), linear then angular, or one number. Gains of the posture are (nv,).
+        Units are as in `ComputedTorque`. Raises GainError, UnknownNameError for the frame.
         """
         super().__init__(model, frame, backend, joint_dynamics)
         kp, kd = feedback_gains(6, kp, kd, natural_frequency, damping_ratio)

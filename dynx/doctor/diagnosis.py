@@ -464,15 +464,15 @@ def diagnose(
     call. dynx compares it with reference values at `samples` random states that follow from `seed`, in tilted
     gravity. A relative error above `tolerance` is a difference. By default common variants are examined too
     (`DoctorReport.variants`); they differ by the user's call, which no file can mend, so they count as
-    differences only if `engines` names them. The mended file has no effect above `fix_tolerance`, and its new
-    numbers have the fewest digits that keep every engine within a tenth of `fix_tolerance`. By default it has
-    no effect above `tolerance`, and all digits. `choose` maps rule ids to one of the rule's `choices`.
-    `level` is the largest change of the mended file: ``safe`` changes nothing that a reader notices,
-    ``rounding`` the equations of motion by rounding only, ``physics`` whatever the causes require. `ignore`
-    has ids or names of rules whose findings make no check fail; with `only`, those of all other rules do not
-    either. They stay in `findings`, are counted in `DoctorReport.ignored`, and are mended. `counterexamples`
-    selects the search for the smallest robot that shows a difference which no rule explains. `progress` is
-    called with the name of each step.
+    differences only if `engines` names them. In the mended file no cause has an effect above `fix_tolerance`,
+    and new numbers have the fewest digits that keep every engine within a tenth of `fix_tolerance`. By
+    default this limit is `tolerance`, and new numbers have all digits. `choose` maps rule ids to one of the
+    rule's `choices`. `level` is the largest change of the mended file: ``safe`` changes nothing that a reader
+    notices, ``rounding`` the equations of motion by rounding only, ``physics`` whatever the causes require.
+    `ignore` has ids or names of rules whose findings make no check fail; with `only`, findings of all other
+    rules make no check fail. They stay in `findings`, are counted in `DoctorReport.ignored`, and are mended.
+    `counterexamples` selects the search for the smallest robot that shows a difference which no rule
+    explains. `progress` is called with the name of each step.
 
     A robot that cannot be read gives a report with `error` set, whose `findings` are the places without a
     remedy. Raises ArgumentError, UnknownBackendError, NotInstalledError and UnknownNameError for arguments

@@ -205,10 +205,10 @@ class DoctorReport:
     `residual` is the largest relative error that remains after mending, `referee` that of the reference
     values themselves (mass matrix and inverse dynamics at one state) against 50 digits. `choices` are
     sentences on the decisions where the file is ambiguous and on the changes to the physics of the robot.
-    `level` is the highest level of the remedies in the mended file; `changes` are theirs, and those that the
-    level leaves undone. `model_difference` lists the values of engines that the file does not state.
-    `variants` are other common calls of the engines; they count neither for `alike` nor for `explained`,
-    `findings` and `residual`.
+    `level` is the highest level of the remedies in the mended file. `changes` are the changes of these
+    remedies, and the changes that the level leaves undone. `model_difference` lists the values of engines
+    that the file does not state. `variants` are other common calls of the engines; they count neither for
+    `alike` nor for `explained`, `findings` and `residual`.
     """
 
     robot: str
@@ -354,7 +354,7 @@ class DoctorReport:
 
     @property
     def skipped(self) -> tuple[str, ...]:
-        """Names of what every engine skips in the file (`dynx.rules.Rule.skipped`)."""
+        """Names of the elements that every engine skips in the file (`dynx.rules.Rule.skipped`)."""
         found = {finding.rule for finding in self.findings}
         return tuple(rule.skipped for rule in all_rules() if rule.skipped and rule.id in found)
 

@@ -43,10 +43,10 @@ MAX_SIDE = 8192
 class TaskEnvironment(Env[Any, Any]):
     """A task on one engine, with the interface of `gymnasium.Env`.
 
-    ``terminated`` is the task's; ``truncated`` is True here where a step diverged, and set by the time limit
-    that `gymnasium.make` adds (`Task.max_episode_steps`). `render` returns the picture of the task's camera
-    (``"rgb_array"``); with ``"human"`` each step is shown in the browser, at most as fast as in reality. Not
-    safe for several threads.
+    ``terminated`` is True if the task ended the episode. ``truncated`` is True if a step diverged, and at the
+    time limit that `gymnasium.make` adds (`Task.max_episode_steps`). `render` returns the picture of the
+    task's camera (``"rgb_array"``); with ``"human"`` each step is shown in the browser, at most as fast as in
+    reality. Not safe for several threads.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES)}  # noqa: RUF012  (declared by `Env`)
@@ -154,8 +154,8 @@ class TaskEnvironment(Env[Any, Any]):
         A step that diverges, or that the engine fails to take, truncates the episode: the observation is that
         before the step, the reward 0, and ``info["diverged"]`` says why. Raises EpisodeError before the first
         `reset` and after the end of an episode, and ArgumentError (and its kinds) for an action that is not
-        in the action space; the episode is unchanged then. What the methods of a `RobotTask` return raises
-        ShapeError, DTypeError or NotFiniteError, which name the task and the method.
+        in the action space; the episode is unchanged then. Raises ShapeError, DTypeError or NotFiniteError
+        for an invalid result of a method of a `RobotTask`; the error names the task and the method.
         """
         episodes = self.episodes
         if self._phase != "running":

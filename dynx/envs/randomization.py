@@ -111,7 +111,7 @@ AXES = ("x", "y", "z")
 @checks_types
 @dataclass(frozen=True)
 class Randomization:
-    """Parameters that each episode draws; None for those that keep the values of the task.
+    """Parameters that each episode draws; a field that is None keeps the value of the task.
 
     A distribution is a number, ``(low, high)`` for uniform numbers, ``{"log_uniform": (low, high)}``, or
     ``{"normal": (mean, deviation)}`` clamped at three deviations. A mapping from names to distributions draws

@@ -89,8 +89,8 @@ ENVIRONMENT_OPTIONS = ("engine", "render_mode", "randomize", "width", "height", 
 
 
 class Outcome(NamedTuple):
-    """The outcome of one step, as `gymnasium.Env.step` returns it but for ``truncated``, which is the time
-    limit's."""
+    """The outcome of one step, as `gymnasium.Env.step` returns it, without ``truncated``, which the time
+    limit sets."""
 
     observation: Any
     reward: float
@@ -102,8 +102,8 @@ class Outcome(NamedTuple):
 class Task(ABC):
     """A task, with its options as the fields of a frozen dataclass; it keeps no state.
 
-    A subclass is a task of one kind of motion: `dynx.envs.RobotTask` (a robot without contacts, on any
-    backend) or `dynx.envs.WorldTask` (a scene with contacts, on any world engine).
+    Derive your task from the subclass for its kind of motion: `dynx.envs.RobotTask` (a robot without
+    contacts, on any backend) or `dynx.envs.WorldTask` (a scene with contacts, on any world engine).
     """
 
     control_dt: ClassVar[float]
@@ -284,8 +284,8 @@ class RobotTask(Task):
     ) -> Mapping[str, float]:
         """Return the terms whose sum is the reward, by name; by default none.
 
-        Only what shows an episode asks for them. They do not make the reward: `reward` does, and a task
-        computes the sum there.
+        The terms are only for display. They do not determine the reward: `reward` does, and it has to compute
+        the sum itself.
         """
         return {}
 
@@ -449,8 +449,8 @@ class WorldTask(Task):
     def reward_terms(self, episode: Episode, action: Any) -> Mapping[str, float]:
         """Return the terms whose sum is the reward, by name; by default none.
 
-        Only what shows an episode asks for them. They do not make the reward: `reward` does, and a task
-        computes the sum there.
+        The terms are only for display. They do not determine the reward: `reward` does, and it has to compute
+        the sum itself.
         """
         return {}
 

@@ -17,7 +17,8 @@ _COMMANDS = {"error": "error", "warning": "warning", "note": "notice"}
 
 
 def github_annotations(sarif: Mapping[str, Any]) -> list[str]:
-    """Return the command of each result of a SARIF document (`sarif_run`), but those in the baseline.
+    """Return GitHub's command that shows each result of a SARIF document (`sarif_run`), except those in the
+    baseline.
 
     The findings of ignored rules are counted in one notice.
     """

@@ -87,20 +87,20 @@ def inverse_kinematics(
     The result is checked by forward kinematics. If a target is not reached, no error is raised, and the
     result has the best q found. The status is UNREACHABLE if the target is farther than the chain is long, so
     that no configuration reaches it (`dynx.ik.reach`). It is TIMED_OUT if `timeout` [s] stopped the search,
-    otherwise NOT_FOUND. Samples of a batch that were not begun then have the start as q and NaN as errors.
+    otherwise NOT_FOUND. With TIMED_OUT, samples of a batch that were not begun have the start as q and NaN as
+    errors.
 
     With `avoid`, a scene or what `Scene.avoidance` returns, a solution keeps the robot's links at least a
-    margin from the obstacles and from one another, by certified distances (`dynx.distance`). Solutions that
-    do not are replaced: by others of the closed form or from further starts, or by moving redundant joints.
-    If each solution found is too close to something, the status is IN_COLLISION and the message names the
-    pair.
+    margin from the obstacles and from one another, by certified distances (`dynx.distance`). dynx replaces a
+    solution that is closer: by another of the closed form or of further starts, or by moving redundant
+    joints. If each solution found is too close, the status is IN_COLLISION and the message names the pair.
 
     With ``all_solutions=True`` the result is an `IKSolutions` with every configuration within limits that
-    reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). It exists for
-    six revolute joints with a spherical wrist or three parallel axes, and for many arms with prismatic
-    joints. `given` holds positions [rad or m] of further joints between root and frame, such as one joint of
-    seven. Angles are those nearest to q0, or to 0; `IKSolutions.with_full_turns` lists the others within the
-    limits. The options of the search have no effect then.
+    reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). A closed form
+    exists for six revolute joints with a spherical wrist or three parallel axes, and for many arms with
+    prismatic joints. `given` holds positions [rad or m] of further joints between root and frame, such as one
+    joint of seven. Angles are those nearest to q0, or to 0; `IKSolutions.with_full_turns` lists the others
+    within the limits. The options of the search have no effect then.
 
     Raises UnknownNameError for the frame or the name of an option; ArgumentError (ShapeError, DTypeError,
     NotFiniteError) for an invalid argument, and for method ``"engine"`` if the backend has no solver of its

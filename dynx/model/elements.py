@@ -290,8 +290,8 @@ class Joint:
 
     `axis` is a unit vector in the joint frame; that of a ball joint is the default. `locked_at` is the
     position at which a movable joint was locked; its type is then ``fixed`` and `origin` includes that
-    position. A joint that is fixed without that has the default axis, limits, dynamics and mimic, whatever
-    is given: they mean nothing there, and no file has them.
+    position. A joint that is ``fixed`` in the description has the default axis, limits, dynamics and mimic,
+    whatever is given, because they have no meaning for such a joint.
     """
 
     name: str

@@ -70,10 +70,10 @@ class LibraryRobot:
 @lru_cache(maxsize=1)
 def robots() -> tuple[LibraryRobot, ...]:
     """List the robots of the library, without the traps: example-robot-data, then dynx's own, each sorted by
-    name. They are searched for once for a process.
+    name. dynx searches for them once per process.
 
-    Names are unique. An alias is the stem of the file, where no robot has it as its name and no other file
-    has this stem.
+    Names are unique. The alias of a robot is the stem of its file, unless a robot has this name or another
+    file has this stem.
     """
     files = [(path, EXAMPLE_ROBOT_DATA, root) for root in example_roots() for path in _urdf_files(root)]
     files += [(path, DYNX_MODELS, root) for root in own_roots() for path in _urdf_files(root)]

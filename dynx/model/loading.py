@@ -56,7 +56,7 @@ def load(
     - the name of a robot in the library, see ``dynx robots``. It takes precedence over a file of that name in
       the working directory; write ``./name`` for the file. A name that is not in the library may be a file
       of ``pybullet_data`` without its suffix, such as ``r2d2``, or any file;
-    - a `Model`, whose base, its pose and gravity are kept unless they are given.
+    - a `Model`, whose base, base pose and gravity are kept unless you give others.
 
     `base` is ``"fixed"`` (default) or ``"floating"``; MJCF and SDF state their own, and the gravity. `lock`
     fixes joints, by name, at positions [rad or m]; they are removed from q. `gravity` is (3,) [m/s^2] in

@@ -269,7 +269,7 @@ def springs_of(mechanism: Mechanism, stiffness: Array, reference: Array) -> Join
 def build_mechanism(tree: Tree, convert: ScalarConverter = float64) -> Mechanism:
     """Merge the links connected by fixed joints and their inertias, in the scalar type of `convert`.
 
-    Poses and inertias of all links are computed together, which takes a quarter of the time of one by one.
+    Poses and inertias of all links are computed together, because this is faster.
     """
     # Placement of each link: its body and its pose (R, p) in the frame of that body.
     identity = convert(np.eye(3)), convert(np.zeros(3))

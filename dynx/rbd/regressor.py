@@ -197,7 +197,7 @@ def _times(row: Array, A: Array) -> Array:
 def inertial_parameters(model: Model, convert: ScalarConverter = float64) -> Array:
     """Return pi (10 n_links,): the ten parameters of each of `model.links`, zeros without an inertial.
 
-    `convert` makes arrays of scalars of a file's numbers; ArgumentError for one that changes their shape.
+    `convert` gives arrays of another scalar type. Raises ArgumentError if it changes the shape.
     """
     if np.shape(made := convert(np.zeros(3))) != (3,):
         raise ArgumentError(

@@ -102,7 +102,7 @@ def same_robot(
 
     dynx merges links across fixed joints. It compares the lines of the joint axes at the zero positions, and
     the base inertial parameters of the bodies (Gautier and Khalil 1990). Frames of links, the signs of axes,
-    and inertia that no state shows may differ (`SameReport.freedoms`). The robots are the same if all else
+    and inertia that affects no motion may differ (`SameReport.freedoms`). The robots are the same if all else
     differs by at most `tolerance` of its scale: the reach of the robot for lengths, 1 rad for angles, the
     body's own inertia for inertias. dynx computes differences in 50 digits from the decimals of the files. If
     the robots differ, the report has the fewest elements of `b` to replace, and `b` mended.

@@ -92,13 +92,14 @@ class _ReportFields:
 class SameReport(_ReportFields):
     """Whether two descriptions are those of one robot, and what differs.
 
-    `first` and `second` are the names that the caller gave, the sources where they were read from.
-    `differences` are the fewest elements of the second description that make it the same when replaced,
-    `unmatched` what cannot be mended by replacing elements. `attributes` are other differences, which
-    do not change the verdict; `freedoms` are allowed differences, other ways to describe the same motion.
-    `bounds` hold for robots that are the same. `mended` is the second robot with the differences removed;
-    `mended_text` the bytes of its file, None where nothing is to be mended or `not_mended` says why not.
-    `T_first_second` (4, 4) is the pose of the second robot's base frame in the first's, for floating bases.
+    `first` and `second` are the names that the caller gave, `first_source` and `second_source` the files or
+    texts that were read. `differences` are the fewest elements of the second description that make it the
+    same when replaced, `unmatched` what cannot be mended by replacing elements. `attributes` are other
+    differences, which do not change the verdict; `freedoms` are allowed differences, other ways to describe
+    the same motion. `bounds` hold for robots that are the same. `mended` is the second robot with the
+    differences removed; `mended_text` the bytes of its file, None where nothing is to be mended or
+    `not_mended` says why not. `T_first_second` (4, 4) is the pose of the second robot's base frame in the
+    first's, for floating bases.
     """
 
     T_first_second: Floats | None

@@ -552,7 +552,8 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
       controller of your own by the name of a public attribute that is a number or an array of numbers
     - `joint_damping`, `joint_friction`, `joint_armature` (n,), (n, 1) or (n, joints); a number, numbers
       (joints,) or True hold for all rollouts, as in `simulate`; numbers by joint can be (n,),
-      ``{"elbow_joint": [0.1, 0.2]}``. True, the default, stands for the `parameters` where these have them
+      ``{"elbow_joint": [0.1, 0.2]}``. With True, the default, values in `parameters` replace those of the
+      description
     - `q0` (n, nq), `v0` (n, nv); one row holds for all rollouts. The default is the start of the reference,
       and rest if `q0` is given
     - `noise` of the measurements: rollout k has the noise of ``simulate`` with ``Noise(..., rollout=k)``

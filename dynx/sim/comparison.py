@@ -539,7 +539,7 @@ class RolloutComparison:
 
     @property
     def proved(self) -> bool:
-        """True if the rollouts part, and taking over the causes removes the distance."""
+        """True if the rollouts differ, and taking over the causes removes the distance."""
         reruns = (self.remaining, self.repeated)
         return not self.alike and all(each is not None and each <= self.tolerance for each in reruns)
 
@@ -583,15 +583,17 @@ def compare(ours: Any, theirs: Any, *given: Any, **options: Any) -> Any:
     """Find out how far apart two motions are.
 
     - ``compare(rollout, rollout, tolerance=, rerun=, progress=)``: two rollouts of a robot, or logs that
-      `Rollout.load` reads, and why they part: the differences of their scenarios (`RolloutComparison`).
+      `Rollout.load` reads, and the differences of their scenarios that cause the distance
+      (`RolloutComparison`).
     - ``compare(scene, engines, duration, dt=1e-3, substeps=, settings=, samples=, finish=, progress=)``: the
       motions of one scene in the worlds of several engines (`dynx.world.WorldComparison`).
 
     dynx takes over each difference of two scenarios (an argument of `simulate`, a gain, a link, a joint) from
     `theirs` into `ours` alone, and simulates again. Then it takes over all differences except this one, and
-    simulates again. With all of them the rerun must be `theirs` again, which is the proof that nothing else
-    is a cause. `tolerance` is the distance [rad or m] up to which rollouts are alike. Without `rerun` the
-    differences are listed only. `progress` is called with the number of reruns done and their total number.
+    simulates again. If it takes over all differences, the rerun must equal `theirs`. This proves that nothing
+    else is a cause. `tolerance` is the distance [rad or m] up to which rollouts are alike. Without `rerun`
+    dynx only lists the differences. `progress` is called with the number of reruns done and their total
+    number.
 
     The engines run the scene for `duration` [s] in steps of `dt` / `substeps` [s], with the `settings` of
     `World` by engine; states are compared at `samples` times. `finish` is called with each world at its end,

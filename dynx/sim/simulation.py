@@ -625,33 +625,34 @@ def simulate(given: SimulateArguments) -> Rollout:
     fields of a scenario are the other arguments. Together with a scenario you can give only `resume`, `step`
     and `progress`.
 
-    The plant and the controller can use different engines (``controller_backend`` replaces the controller's
-    own), so that the effect of an error in one of them can be studied.
+    The plant and the controller can use different engines (``controller_backend`` replaces the backend of the
+    controller). So you can study the effect of an error in one engine.
 
-    **Plant.** ``plant="pybullet"`` is PyBullet's own stepper; with ``integrator="engine"`` MuJoCo and Drake
-    are theirs. Any other name is a backend whose forward dynamics an `integrator` of dynx integrates.
-    Integrators are ``semi_implicit`` (the default: v then q, the scheme of Bullet), ``rk4``, and ``adaptive``
-    (SciPy's `method` with `rtol`, `atol`). ``plant="pybullet", integrator="rk4"`` is PyBullet's forward
-    dynamics under RK4. Without a controller (None) the robot has no motors. A `ScenePlant` is the robot in a
-    scene, with contacts; the rollout then has `surroundings`. `reference` is a trajectory, one configuration
-    (nq,) to hold, or None. The initial state is `q0`, `v0`; by default that of the scene, the start of the
-    reference, or the neutral configuration.
+    **Plant.** ``plant="pybullet"`` is PyBullet's own stepper. With ``integrator="engine"``, the plants
+    ``"mujoco"`` and ``"drake"`` are the steppers of MuJoCo and Drake. Any other name is a backend whose
+    forward dynamics an `integrator` of dynx integrates. Integrators are ``semi_implicit`` (the default: v
+    then q, the scheme of Bullet), ``rk4``, and ``adaptive`` (SciPy's `method` with `rtol`, `atol`).
+    ``plant="pybullet", integrator="rk4"`` is PyBullet's forward dynamics under RK4. Without a controller
+    (None) the robot has no motors. A `ScenePlant` is the robot in a scene, with contacts; the rollout then
+    has `surroundings`. `reference` is a trajectory, one configuration (nq,) to hold, or None. The initial
+    state is `q0`, `v0`; by default that of the scene, the start of the reference, or the neutral
+    configuration.
 
     **Time** [s]. `dt` is the step of the record; the plant takes `substeps` steps in each. The controller
     runs every `control_dt` (by default `dt`), and its torque is held in between. It measures the state as it
     was `delay` earlier, or the initial state if that is before the start; `control_dt` and `delay` are
     multiples of `dt`. The default `duration` is that of the reference. It is rounded up to a multiple of
-    `dt`; a reference that has ended before is held at its end.
+    `dt`. After the end of the reference, the setpoint is its last configuration.
 
     **Joints**, the same in every plant: `joint_damping`, dry `joint_friction` and `joint_armature`. Each is
-    True for the values of the description (the default, as in a world), False for none, one number, or one
-    number for each joint. With numbers by joint, ``{"elbow_joint": 0.5}``, joints that are not named have
-    none. Dry friction holds a joint at rest up to its magnitude and opposes the motion beyond
+    True for the values of the description (the default, as in a world), False for zero, one number, or one
+    number for each joint. With numbers by joint, ``{"elbow_joint": 0.5}``, the value of all other joints is
+    zero. Dry friction holds a joint at rest up to its magnitude and opposes the motion beyond
     (`dynx.rbd.joint_friction`), at any step. With `friction_slip` [rad/s or m/s] above 0 it is smoothed over
-    that speed instead, so loaded joints creep (`JointFriction`). `effort_limits`, True for the model's,
-    saturate torques and are recorded. With `joint_limits` joints stop at the limits of the description:
-    inelastically (`dynx.steppers.joint_stops`), in a scene by the engine's own law. `pushes` are external
-    wrenches.
+    that speed instead, so loaded joints creep (`JointFriction`). `effort_limits` (True: those of the model)
+    saturate torques, and `Rollout.saturated` states in which steps. With `joint_limits` joints stop at the
+    limits of the description: inelastically (`dynx.steppers.joint_stops`), in a scene by the engine's own
+    law. `pushes` are external wrenches.
 
     **Model error.** The plant has a `payload` and masses scaled by `mass_scale` (all links, or some) that the
     controller does not know; `noise` is added to the measurements. `sensors` and those of a scene are read

@@ -57,11 +57,11 @@ ORIGIN = (0.0, 0.0, 0.0)
 class ExternalForce:
     """A wrench (6,), force [N] then moment [N m], on a part from `start` [s] for `duration` [s].
 
-    In a world `on` is a body, ``robot/link`` or ``robot/frame``, and for its only robot the frame alone; in a
-    simulation it is a frame of the robot. `reference` names the point and the axes of the wrench, as for
-    `external_forces` of a backend. ``local_world_aligned`` is the origin of the frame and the axes of the
-    world. ``local`` is the origin and the axes of the frame, ``world`` those of the world. The force acts at
-    `point` (3,) [m] of the frame, which moves with it, instead of at its origin.
+    In a world `on` is a body, ``robot/link`` or ``robot/frame``; if the world has one robot, the frame's name
+    suffices. In a simulation `on` is a frame of the robot. `reference` names the point and the axes of the
+    wrench, as for `external_forces` of a backend. ``local_world_aligned`` is the origin of the frame and the
+    axes of the world. ``local`` is the origin and the axes of the frame, ``world`` those of the world. The
+    force acts at `point` (3,) [m] of the frame, which moves with it, instead of at its origin.
 
     In each step of an engine the wrench is constant, multiplied by the share of the step in which it lasts.
     So the impulse is exact for any start, duration and step, on every engine and under every integrator.

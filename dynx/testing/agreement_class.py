@@ -31,9 +31,9 @@ def agreement_tests(
 
         TestMyRobot = agreement_tests("my.urdf")
 
-    `robot` is a URDF file, its path relative to the test file, or a name of the library. `backends` are
-    the engines to compare (default: all that are installed). Name the class so that pytest collects it.
-    Raises ArgumentError for another base; other invalid arguments fail the tests.
+    `robot` is a URDF file, its path relative to the test file, or a name of the library. `backends` are the
+    engines to compare (default: all that are installed). Name the class so that pytest collects it. Raises
+    ArgumentError for an invalid base. Other invalid arguments make the tests fail.
     """
     if base not in _BASES:
         raise ArgumentError(f"base is {shown(base)}{nearest(base, _BASES)}")

@@ -108,8 +108,8 @@ def from_function(
 
     `f` takes one time and returns one configuration (nq,); it is called here and never again, so the
     trajectory can be pickled whatever `f` is. Velocity and acceleration are those of an interpolant that
-    equals `f` to 1e-13 of the largest value of each coordinate. A `model` checks configurations; a floating
-    base needs it, and a quaternion that changes its sign nowhere.
+    equals `f` to 1e-13 of the largest value of each coordinate. If `model` is given, dynx checks the
+    configurations. For a floating base `model` is required, and the quaternion must not change its sign.
 
     Raises TrajectoryError, with the time, where `f` is not smooth: join smooth motions by `concatenate`, or
     give velocity and acceleration yourself by a class with `Trajectory.inside`. Raises ShapeError,

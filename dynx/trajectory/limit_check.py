@@ -76,9 +76,8 @@ def violations(
     Effort is computed by inverse dynamics along the motion (including the joint dynamics of the description
     with `joint_dynamics`) by `backend`, a name or a backend of the model. With a floating base inverse
     dynamics assumes a wrench on the base that no actuator exerts, so the effort is that of a robot held by
-    its base.
-    ``effort=False`` skips it. The motion is checked at 500 times, on both sides of each knot of the
-    trajectory, and at more times around the largest excesses.
+    its base. ``effort=False`` skips the check of effort. The motion is checked at 500 times, on both sides of
+    each knot of the trajectory, and at more times around the largest excesses.
 
     Raises ShapeError if the trajectory does not fit the model.
     """

@@ -81,15 +81,15 @@ def line(
 
     The motion law s(t) (time scaling) along the line is a quintic from rest to rest in `duration` [s], or any
     trajectory `law` of one coordinate from [0] to [1], such as ``trapezoidal([0], [1], velocity=0.5,
-    acceleration=2)``: its unit is the length of the line. ``cubic([0], [1], T, v0=[1 / T], v1=[1 / T])`` has
+    acceleration=2)``. The value 1 is the end of the line. ``cubic([0], [1], T, v0=[1 / T], v1=[1 / T])`` has
     constant speed. `Backend.track` follows other paths, sampled as poses. The frame deviates at most
     `deviation` [m] and `rotation_deviation` [rad] from the line at any time; the measured deviations are
     attributes of the trajectory. Joints that do not move the frame stay at q0. Only for a fixed base.
 
-    Raises TrajectoryError if beyond some fraction `at` (0 to 1) of the line no configuration within limits is
-    found near the previous one, or the bounds are not met: there the arm is near a singularity, or has to
-    change its posture; or if no motion is found within `timeout` [s]. Raises ArgumentError for invalid
-    arguments.
+    Raises TrajectoryError if from some fraction `at` (0 to 1) of the line on, no configuration within limits
+    is found near the previous one, or the bounds are not met. There the arm is near a singularity, or has to
+    change its posture. Raises TrajectoryError, too, if no motion is found within `timeout` [s]. Raises
+    ArgumentError for invalid arguments.
     """
     time_limit = TimeLimit(timeout)
     path = _StraightLine(model, frame, q0, target, backend)

@@ -386,8 +386,8 @@ class Viewer(Controls):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What cannot be drawn, what is notable at the start of a world, and a host beyond this machine, one
-        sentence each."""
+        """Sentences on what cannot be drawn, on doubtful input at the start of a world, and on a host that
+        other machines can reach."""
         return (*self.page.notes, *self.view.notes)
 
     def update(self, q: ArrayLike | None = None) -> None:
@@ -435,7 +435,7 @@ class Viewer(Controls):
 
     @checks_types
     def set_opacity(self, opacity: float, part: str | None = None) -> None:
-        """Let a part, or all, be seen through: 1 is as described, 0 is not seen.
+        """Set the opacity of a part, or of all: 1 is the opacity of its description, 0 is invisible.
 
         Raises ArgumentError for an unknown part and for an opacity that is not from 0 to 1.
         """
@@ -543,10 +543,10 @@ class Viewer(Controls):
         ``.html`` shows the robot, or plays the motion, without a server and without a network. ``.gif``,
         ``.webp`` and ``.mp4`` (extra ``film``) are films of a motion, and ``.png`` is a picture, also of a
         live world. All are drawn without a browser. `progress` is called with the number of pictures drawn.
-        These have the `size` given, width and height [pixels], and are seen from a `direction` (3,) in the
-        world, or by a `camera`, whose size they have then. A film has `fps` pictures a second, or 12.5 and at
-        most 500 in all for None. Pictures and films show the marks, lines and text of the page, hide the
-        parts that it hides, and say how large the tiles of the ground are.
+        Pictures and films have the given `size`, width and height [pixels], and are seen from a `direction`
+        (3,) in the world. With a `camera` they have its view and its size. A film has `fps` pictures a
+        second, or 12.5 and at most 500 in all for None. Pictures and films show the marks, lines and text of
+        the page, hide the parts that it hides, and say how large the tiles of the ground are.
 
         Raises ArgumentError for a page or a film of a live world, whose motion is not known in advance, for
         another suffix, for a file that cannot be written, for a page whose size, camera or direction is

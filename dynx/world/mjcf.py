@@ -35,8 +35,9 @@ def scene_to_mjcf(
 ) -> str:
     """Return a scene as an MJCF document, complete in itself: the model of its world in MuJoCo.
 
-    The options are those of `World`, with the settings of MuJoCo; `World.to_mjcf` has those of a world, also
-    of one that runs in another engine. The step of the document is that of the engine, dt / substeps [s].
+    The options are those of `World`, with the settings of MuJoCo. `World.to_mjcf` uses the options of the
+    world, also of a world in another engine. The step of the document is that of the engine, dt / substeps
+    [s].
 
     Links are bodies named ``robot/link``, bodies as in the scene, joints ``robot/joint``, free joints as the
     robot or body that they move, geoms by their part and number. A motor ``robot/joint`` applies its ctrl

@@ -300,9 +300,8 @@ class World:
         """Take `n` steps of `dt`, during which torques, motors and external forces act.
 
         `torques` maps robots to generalised forces (nv,); `motors` maps robots to a motor or a list of them,
-        whose law is evaluated in every step of the engine. The motors of the scene act on robots that
-        neither names; otherwise, what is not given does not act. A force acts from its start, a time of this
-        world, for its duration.
+        whose law is evaluated in every step of the engine. The motors of the scene act on robots that neither
+        `torques` nor `motors` names. A force acts from its start, a time of this world, for its duration.
 
         Raises ArgumentError (and its kinds) for arguments, DivergedError where the state stops being finite,
         with the likely cause. After that, and after Ctrl-C in a step, the world is at the last state that was
@@ -354,8 +353,8 @@ class World:
         """Take steps for `duration` [s], rounded up to a multiple of `dt`.
 
         `loads(world)` is called before each step and returns a dict with the arguments of `step` that act
-        during it (``torques``, ``motors``, ``forces``); those given here act otherwise. With `real_time` no
-        step is taken before its time has come on the clock of the machine.
+        during it (``torques``, ``motors``, ``forces``). Arguments that are not in the dict are those of
+        `run`. With `real_time` no step is taken before its time has come on the clock of the machine.
         """
         _ = self._motion.engine
         real_time = checked_bool("real_time", real_time)
@@ -385,7 +384,7 @@ class World:
 
         They follow from the state before the step, its acceleration, the external forces, the contacts and
         `constraint_wrenches`. The component along the axis of a joint is its `torque` plus its
-        `limit_torque`, less what damping, friction, armature and springs of the joint take of them.
+        `limit_torque`, less the torque that damping, friction, armature and springs of the joint take.
         `Backend.joint_wrenches` describes the order, the signs and the options. `robot` may be left out if
         the scene has one.
 

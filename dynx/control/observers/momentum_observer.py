@@ -47,15 +47,15 @@ from dynx.spatial.scalar import Array, Floats
 @checks_field_names(damping="joint_damping", friction="joint_friction", armature="joint_armature")
 @dataclass(frozen=True, eq=False, repr=False)
 class MomentumObserver(ModelEvaluation):
-    """Estimates the external torque (nv,) of a robot from q, v and the torque of its motors (see the module).
+    """Observer that estimates the external torque (nv,) of a robot from q, v and the torque of its motors.
 
     `residuals` is for a log, `update` for a loop. Between two samples the torque is constant, the other terms
     are the mean of both samples, and the filter is exact for a constant external torque. So after a sudden
     change of the external torque the error is below 1 % after 5 time constants, at any rate of samples.
     `wrench` returns the wrench on a link that explains a residual best.
 
-    As an attribute of a controller of your own it is evaluated like `model_dynamics`: by the backend, in
-    compiled steps and batches by compiled code.
+    If it is an attribute of a controller of your own, the backend evaluates it, as with `model_dynamics`. In
+    compiled steps and batches compiled code evaluates it.
     """
 
     model: Model
@@ -130,7 +130,7 @@ class MomentumObserver(ModelEvaluation):
         """Return the state (3 nv + 1,) at a measurement of q (nq,) and v (nv,).
 
         `tau` (nv,) [N m or N] are the torques of the motors since the measurement before, `dt` [s] ago; at
-        the first measurement neither counts. The arguments are not checked, and may be symbols of a trace.
+        the first measurement both are ignored. The arguments are not checked, and may be symbols of a trace.
         """
         nv = self.model.nv
         residual, momentum, rate, begun = state[:nv], state[nv : 2 * nv], state[2 * nv : 3 * nv], state[-1:]

@@ -26,7 +26,7 @@ class Baseline(KnownDifferences):
     is, so that a checkout elsewhere has the same baseline."""
 
     def compare(self, report: DoctorReport) -> BaselineComparison:
-        """Compare a report. A difference of an engine that did not take part has not vanished."""
+        """Compare a report. The difference of an engine that did not take part does not count as vanished."""
         subject = (robot_key(report, self.folder), report.base or "", None)
         engines = {"dynx", *(each.engine for each in report.engines)}
         found = differences(report, self.folder)
@@ -77,7 +77,7 @@ def robot_key(report: DoctorReport, folder: str) -> str:
 
 
 def baseline_document(reports: Iterable[DoctorReport], folder: str) -> dict[str, Any]:
-    """Make the document that accepts all differences of these reports but those of ignored rules."""
+    """Make the document that accepts all differences of these reports, except those of ignored rules."""
     return document_of_differences(
         each
         for report in reports
@@ -87,5 +87,6 @@ def baseline_document(reports: Iterable[DoctorReport], folder: str) -> dict[str,
 
 
 def read_baseline(text: str, path: str) -> Baseline:
-    """Read a baseline from the text of a file; ArgumentError names `path` where it is none."""
+    """Read a baseline from the text of a file. Raises ArgumentError, which names `path`, for any other
+    text."""
     return Baseline.read(text, path)

@@ -287,8 +287,8 @@ def html_page(
     baseline: Baseline | None = None,
     left_out: Sequence[str] = (),
 ) -> str:
-    """Make the page, in ASCII, with the `command` line that reproduces it and the robots `left_out`, in xacro
-    below a directory."""
+    """Make the HTML page, in ASCII. It states the `command` line that reproduces it, and the robots
+    `left_out`: files in xacro below a directory."""
     entries = {cause.rule: cause.entry for report in reports for cause in causes(report) if cause.entry}
     page = template_environment().get_template("doctor.html.j2")
     return page_text(

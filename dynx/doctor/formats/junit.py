@@ -29,7 +29,8 @@ _CAN_BE_EXAMINED = "the file can be examined"
 def junit_xml(
     reports: Iterable[DoctorReport], baseline: Baseline | None = None, left_out: Sequence[str] = ()
 ) -> str:
-    """Make the document, in ASCII. The robots `left_out`, in xacro below a directory, are skipped tests."""
+    """Make the JUnit XML document, in ASCII. The robots `left_out`, files in xacro below a directory, are
+    skipped tests."""
     suites = [_suite(report, baseline) for report in reports]
     for robot in left_out:
         skipped: list[tuple[str, Element | None]] = [

@@ -93,7 +93,7 @@ class IKSolutions(IKResult):
     poses (...), q (..., 8, nq) has eight rows. `success` (..., 8) is True for rows that are solutions. The
     other rows hold the initial configuration (`q0`).
 
-    What is not asked for is not computed: a pose takes a few microseconds.
+    dynx computes an attribute only when it is first used, so a pose takes a few microseconds.
     """
 
     by_frame: Mapping[str, tuple[Floats, Floats]] = MappingProxyType({})
@@ -114,9 +114,8 @@ class IKSolutions(IKResult):
         full_turns: FullTurns | None = None,
     ) -> None:
         """`errors` (..., 2) are those of position [m] and rotation [rad]. `branches` name the rows of q; if
-        `bits` are given, those whose bits are set do.
-
-        Without `success` all rows are solutions, and without `arbitrary` no coordinate is.
+        `bits` are given, only the branches whose bits are set do. Without `success` all rows are solutions,
+        and without `arbitrary` no coordinate is arbitrary.
         """
         found = self.__dict__
         found["q"], found["_errors"], found["_named"] = q, errors, (branches, bits)
@@ -198,7 +197,8 @@ class IKSolutions(IKResult):
         return np.asarray(self.success.sum(axis=-1))
 
     def measured(self, errors: Floats, success: Mask) -> IKSolutions:
-        """Return these solutions with other `errors` (..., 2), of which those in `success` (...,) remain."""
+        """Return these solutions with other `errors` (..., 2); only rows in `success` (...,) remain
+        solutions."""
         if success.ndim > 1:
             return IKSolutions(
                 self.q,

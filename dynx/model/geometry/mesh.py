@@ -85,7 +85,7 @@ class Mesh:
 
     @cached_property
     def parts(self) -> tuple[tuple[Mesh, SurfacePart], ...]:
-        """The triangles as the file divides them by their look: meshes of those of one colour or image.
+        """The triangles divided by colour and image: one mesh for each colour or image of the file.
 
         Raises the errors of `triangles`.
         """
@@ -101,7 +101,7 @@ class Mesh:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What of the look that the file describes is not drawn, one sentence each."""
+        """Sentences on colours and images of the file that are not drawn."""
         from dynx.model.geometry.mesh_reading import mesh_file
 
         if self.fault is not None:

@@ -22,9 +22,9 @@ class ScenePlant:
         dynx.simulate(arm, controller, motion, plant=ScenePlant(scene, "arm", engine="mujoco"))
 
     `robot` is the name of the simulated robot in the scene; it may be left out if the scene has one robot
-    only. The motors of the scene drive the other robots; in the place of those of the simulated robot the
-    controller acts. `engine` and `settings` are those of `dynx.world.World`. Joints stop by the engine's own
-    law, unless the simulation has ``joint_limits=False``.
+    only. The motors of the scene drive the other robots; the controller replaces the motors of the simulated
+    robot. `engine` and `settings` are those of `dynx.world.World`. Joints stop by the engine's own law,
+    unless the simulation has ``joint_limits=False``.
 
     Raises ArgumentError and its kinds for a robot, an engine or a setting that does not exist.
     """
@@ -58,8 +58,8 @@ class ScenePlant:
         return next(robot for robot in self.scene.robots if robot.name == self.robot)
 
     def unrecorded(self, base: bool = False) -> str:
-        """Return why a record does not tell what the joints of the robot transmit, with `base` what its
-        foundation does: a constraint, whose forces no record has; else ""."""
+        """Return why a record does not determine the joint wrenches of the robot, or with `base` its base
+        wrench: a constraint acts on it, whose forces are not recorded. Return "" if there is none."""
         for each in self.scene.constraints:
             ends = [end.partition("/")[0] == self.robot for end in (each.a, each.b)]
             # A constraint between two links of the robot is internal to it.

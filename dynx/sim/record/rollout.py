@@ -176,8 +176,8 @@ class Rollout:
 
     @cached_property
     def energy(self) -> Floats:
-        """Sum of kinetic and potential energy (n + 1,) [J], that of the springs which act included, computed
-        by dynx for every plant."""
+        """Sum of kinetic and potential energy (n + 1,) [J], including the energy of the springs, computed by
+        dynx for every plant."""
         springs = self.scenario is not None and self.scenario.joint_springs
         with backend("reference", self.model) as bodies:
             return np.asarray(self.kinetic_energy + bodies.potential_energy(self.q, joint_dynamics=springs))
@@ -187,8 +187,8 @@ class Rollout:
         """Wrenches (n, 6) from outside in each step, by the frames on which they act: pushes and contacts.
 
         Force [N] and moment [N m] are about the origin of the world, in its axes: the reference ``world`` of
-        `Backend.joint_wrenches`. Forces of constraints and of joint limits, which no engine gives, are not
-        among them.
+        `Backend.joint_wrenches`. The forces of constraints and of joint limits, which a rollout does not
+        record, are not among them.
         """
         nothing = np.zeros((len(self), 6))
         pushes = () if self.scenario is None else self.scenario.all_pushes
@@ -245,8 +245,8 @@ class Rollout:
     def sensors(self) -> Mapping[str, Readings]:
         """Readings of the sensors of the scenario and of its scene, by name.
 
-        They follow from the recorded motion, so that no file has more than the scenario for them. A sensor of
-        the scene on another robot, whose acceleration is not recorded, raises UnsupportedFeatureError.
+        dynx computes them from the recorded motion, also after `load`. Raises UnsupportedFeatureError for a
+        sensor on another robot of the scene, whose acceleration is not recorded.
         """
         return self._read_own_sensors()
 
@@ -283,8 +283,9 @@ class Rollout:
 
     @cached_property
     def overshoot(self) -> Overshoot | None:
-        """Joint whose damping is unstable for the control step, so that its torque reverses in each of many
-        successive ones: an oscillation that only limits bound. None without one, or without a scenario."""
+        """Joint whose damping gain is unstable for the control step, so that its torque reverses in each of
+        many successive steps. Only limits bound such an oscillation. None without such a joint, or without a
+        scenario."""
         scenario, n = self.scenario, len(self.model.joint_names)
         if scenario is None or not isinstance(scenario.controller, Controller) or not n:
             return None

@@ -102,7 +102,7 @@ class Scenario(SimulationOptions):
     The fields are the arguments of `dynx.simulate`, which documents them. Two scenarios are equal if all
     fields are equal, element by element, with the defaults filled in. Joint dynamics and limits that a
     description does not have count as switched off. ``dataclasses.replace`` changes one field; `to_json` and
-    `from_json` keep every bit. Types are checked here, values when a simulation is made of it.
+    `from_json` keep every bit. The constructor checks types; a simulation checks the values when it starts.
     """
 
     model: Model
@@ -161,8 +161,8 @@ class Scenario(SimulationOptions):
         )
 
     def for_record(self) -> Scenario:
-        """Return an equal scenario that stays as it is if the user changes a controller or a trajectory of a
-        class of their own later."""
+        """Return an equal scenario that does not change if the user later changes their own controller or
+        trajectory."""
         parts: dict[str, Any] = {
             name: copy_for_record(part)
             for name, part in (("controller", self.controller), ("reference", self.reference))

@@ -37,10 +37,10 @@ class Scene:
     """Everything that is in a world at the start, for every engine alike.
 
     A part is named by its body, its robot, or ``robot/link``. `ignored` are pairs of names that do not
-    collide. A robot stands for all its links, and a name in `groups` for all its members. A pair of one name
-    twice makes the parts of this name ignore one another. Gravity (3,) [m/s^2] is that of the scene, not of
-    the models. `sensors` are read by `World.read_sensors`. `notes` say how a file was read that states more
-    than a scene, such as one in MJCF.
+    collide. A robot stands for all its links, and a name in `groups` for all its members. If both names of a
+    pair are the same, the parts of this name do not collide with one another. Gravity (3,) [m/s^2] is that of
+    the scene, not of the models. `sensors` are read by `World.read_sensors`. `notes` state how dynx read a
+    file that contains more than a scene can hold, such as one in MJCF.
     """
 
     name: str = "scene"
@@ -170,8 +170,8 @@ class Scene:
 
         Its links keep `margin` [m] from bodies and other robots, which stay where they start, and
         `self_margin` (by default `margin`) from one another, by certified distances. Bodies with mass that
-        are welded to the robot move with it. Pairs in `ignored` are left out. `robot` is needed if there are
-        several.
+        are welded to the robot move with it. Pairs in `ignored` are left out. `robot` is needed if the scene
+        has several robots.
 
         Raises UnknownNameError for the robot or an option, ArgumentError for a margin, a scene without robots
         and a robot none of whose moving links has a collision shape, and the errors of collision shapes.
@@ -194,10 +194,9 @@ class Scene:
     def avoidance_for(
         self, model: Model, *, margin: float = MARGIN, self_margin: float | None = None
     ) -> Avoidance:
-        """Return what the robot that is `model` keeps away from, with margins as `avoidance` has them.
-
-        A scene without robots has it as its only one. Raises ArgumentError unless exactly one robot of the
-        scene is like `model`, or the scene has none; and the errors of `avoidance`.
+        """Return what the robot that is `model` keeps away from, with the margins of `avoidance`. In a scene
+        without robots, `model` is the only robot. Raises ArgumentError unless exactly one robot of the scene
+        is like `model`, or the scene has none; and the errors of `avoidance`.
         """
         margins = margin, self_margin
         numbers = all(each is None or is_real(each) for each in margins)

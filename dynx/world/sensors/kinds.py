@@ -60,8 +60,8 @@ class ForceTorqueSensor(PlacedSensor):
     frame. So the sensor of an arm at rest reads a force upwards. `on` is a joint, fixed or moving, with
     `pose` in the frame of its child link. Or `on` is a frame of the robot that lies on the child link of the
     joint, with `pose` in this frame. On the root link of a robot with a fixed base it is the wrench of the
-    foundation. Without `weight`, what the weight of the links beyond the joint contributes in their present
-    pose is subtracted.
+    foundation. With ``weight=False`` the reading does not contain the weight of the links beyond the joint in
+    their present pose.
     """
 
     weight: bool = True
@@ -183,8 +183,8 @@ class JointTorqueSensor(Sensor):
 @checks_types
 @dataclass(frozen=True, kw_only=True)
 class Encoder(Sensor):
-    """An encoder of a joint: ``position`` [rad or m] and ``velocity`` [rad/s or m/s]; of a mimic joint, its
-    own."""
+    """An encoder of a joint: ``position`` [rad or m] and ``velocity`` [rad/s or m/s]. On a mimic joint it
+    reads the mimic joint itself."""
 
     position: SensorErrors = NO_ERRORS
     velocity: SensorErrors = NO_ERRORS
@@ -235,8 +235,8 @@ class ContactSensor(PlacedSensor):
 @checks_types
 @dataclass(frozen=True, kw_only=True)
 class RaySensor(PlacedSensor):
-    """A sensor of the ``distance`` [m] along the z axis of its frame to what is hit first, `length` [m] where
-    nothing is hit within it.
+    """A sensor of the ``distance`` [m] along the z axis of its frame to the first hit; without a hit within
+    `length` [m] it reads `length`.
 
     It is on a link or body, whose own shapes the ray passes through.
     """

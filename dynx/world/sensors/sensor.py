@@ -38,9 +38,10 @@ class Sensor(ABC):
     """A sensor `on` a part: ``robot/frame``, ``robot/joint`` or a body; the frame or joint alone in a
     simulation, and in a scene of one robot.
 
-    `rate` [Hz] is that of its samples, one for each step without it. A sample is taken at the beginning of
-    the first step at or after each multiple of ``1 / rate``, and can be read `delay` [s] later. Its random
-    numbers depend on its `seed`, its name, the number of the rollout and the number of the sample alone.
+    `rate` [Hz] is the number of samples per second; by default there is one sample in each step. A sample is
+    taken at the beginning of the first step at or after each multiple of ``1 / rate``, and can be read
+    `delay` [s] later. Its random numbers depend only on its `seed`, its name, the number of the rollout and
+    the number of the sample.
     """
 
     name: str
