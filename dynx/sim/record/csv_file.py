@@ -5,13 +5,14 @@ The first line names the columns, in this order; ``c`` stands for each coordinat
 | columns | content | unit |
 |---|---|---|
 | `t` | time | s |
-| `q:c`, `v:c` | position, velocity | rad or m; per s |
-| `q*:c`, `v*:c`, `a*:c` | reference, if any: position, velocity, acceleration | rad or m; per s; per s^2 |
+| `q:c`, `v:c` | position, velocity | rad or m; rad/s or m/s |
+| `q*:c`, `v*:c` | position and velocity of the reference, if any | rad or m; rad/s or m/s |
+| `a*:c` | acceleration of the reference, if any | rad/s^2 or m/s^2 |
 | `error:c` | tracking error, if there is a reference | rad or m |
 | `energy` | sum of kinetic and potential energy | J |
 | `a:c`, `tau:c` | acceleration and torque in the step that starts at this time | rad/s^2 or m/s^2; N m or N |
-| `saturated:c` | 1 if the motor was at its limit in that step, otherwise 0 | |
-| `contact:name:x`, `:y`, `:z` | sum of the contact forces on a body or link in that step, in world axes | N |
+| `saturated:c` | 1 if the motor was at its limit in the step that starts at this time, otherwise 0 | |
+| `contact:name:x`, `:y`, `:z` | total contact force on a body or link in the same step, in world axes | N |
 | `sensor:name:value` | sample of a sensor, if it took one at this time, otherwise empty | as in the sensor |
 
 Coordinates have the names of their joints. A floating base comes first: `x y z qx qy qz qw` in positions (of
