@@ -59,7 +59,7 @@ def arm(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("Humanoid", "Unitree's G1 with raised hands, seen from nearly the front.")
+@picture("Humanoid", "Unitree's G1 with raised hands, seen almost from the front.")
 def humanoid(path: str) -> None:
     model = dynx.load("g1", base="floating")
     q = model.neutral()
@@ -99,14 +99,14 @@ def stack(path: str) -> None:
             viewer.export(path, size=SIZE)
 
 
-@picture("Lander", "A lander comes down on its pad between two flags, on the Moon.")
+@picture("Lander", "A lander descends to its pad between two flags on the Moon.")
 def lander(path: str) -> None:
     with World(read_scene("landing"), "mujoco") as world, world.view(steps=False) as viewer:
         viewer.set_shown("contact forces", False)
         viewer.export(path, size=SIZE, direction=(0.5, -1.0, 0.3))
 
 
-@picture("Cart-pole", "State feedback balances a pole that starts at 23 degrees from the vertical.", ".webp")
+@picture("Cart-pole", "State feedback balances a pole, which starts 23 degrees from the vertical.", ".webp")
 def cart_pole(path: str) -> None:
     robot = SceneRobot("cart_pole", dynx.load("cart_pole"), q=[0.0, 0.4])
     world = World(Scene("cart-pole", robots=[robot]), "mujoco")
@@ -118,14 +118,14 @@ def cart_pole(path: str) -> None:
             viewer.update()
 
 
-@picture("Gripper", "Friction alone holds the cube that a Panda lifts.", ".webp")
+@picture("Gripper", "A Panda lifts a cube, which only friction holds in the gripper.", ".webp")
 def gripper(path: str) -> None:
     run = compare_engines(read_scene("lifting"), ["mujoco"], duration=1.4)
     with Viewer(run, port=0) as viewer:
         viewer.export(path, size=FILM)
 
 
-@picture("R2D2", "The robot of PyBullet's first example, in the colours of its description.")
+@picture("R2D2", "R2D2 from PyBullet's first example, in the colours of its URDF file.")
 def r2d2(path: str) -> None:
     import pybullet_data
 
@@ -134,7 +134,7 @@ def r2d2(path: str) -> None:
         viewer.export(path, size=SIZE, direction=(0.75, -1.0, 0.4))
 
 
-@picture("Contacts", "Contact forces on the feet of a standing quadruped. Their sum is its weight.")
+@picture("Contacts", "Contact forces on the feet of a standing A1. The sum of the forces is its weight.")
 def contacts(path: str) -> None:
     with World(read_scene("standing"), "mujoco") as world:
         world.step(1500)
@@ -145,7 +145,7 @@ def contacts(path: str) -> None:
 
 @picture(
     "Inertia ellipsoids",
-    "On each link of a Solo, the ellipsoid of uniform density that has the link's mass and inertia.",
+    "Each ellipsoid on a Solo has uniform density, and the mass and inertia of its link.",
 )
 def inertia_ellipsoids(path: str) -> None:
     model = dynx.load("solo12", base="floating")
@@ -155,7 +155,7 @@ def inertia_ellipsoids(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("Frames", "The frames of the links in a see-through Panda: x is red, y green and z blue.")
+@picture("Frames", "The link frames of a see-through Panda: x is red, y is green and z is blue.")
 def frames(path: str) -> None:
     with dynx.load("panda").view(q=[0, -0.5, 0, -2.1, 0, 1.6, 0.8, 0.02], whole_meshes=True) as viewer:
         viewer.set_shown("frames")
@@ -176,7 +176,7 @@ def two_engines(path: str) -> None:
 
 @picture(
     "Gravity torques",
-    "Arrows along the joint axes. The length is the torque divided by its limit, the number is the torque.",
+    "The numbers are the torques against gravity. Each arrow has the length torque divided by limit.",
 )
 def gravity_torques(path: str) -> None:
     with dynx.load("panda").view(q=[0, 0.5, 0, -1.6, 0, 2.1, 0.8, 0.02], whole_meshes=True) as viewer:
@@ -185,7 +185,7 @@ def gravity_torques(path: str) -> None:
 
 
 @picture(
-    "Manipulability", "The ellipsoid of the velocities that the flange has for joint velocities of norm 1."
+    "Manipulability", "The ellipsoid shows the velocities of the flange for all joint velocities of norm 1."
 )
 def manipulability(path: str) -> None:
     with dynx.load("ur5").view(q=[0.6, -0.9, 1.2, -1.8, -1.57, 0.3], whole_meshes=True) as viewer:
@@ -195,7 +195,7 @@ def manipulability(path: str) -> None:
 
 @picture(
     "Collision shapes",
-    "The convex hulls that engines use for collisions of a Panda, drawn over its visual shapes.",
+    "Engines use these convex hulls for collisions of a Panda. They are drawn over its visual shapes.",
 )
 def collision_shapes(path: str) -> None:
     with dynx.load("panda").view(q=[0, -0.5, 0, -2.1, 0, 1.6, 0.8, 0.02], whole_meshes=True) as viewer:
@@ -203,14 +203,14 @@ def collision_shapes(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("Names", "Names of the links of a hand. Names that would overlap others are left out.")
+@picture("Names", "Names of the links of a hand. The viewer leaves out names that would overlap other names.")
 def names(path: str) -> None:
     with dynx.load("allegro_right_hand").view(whole_meshes=True) as viewer:
         viewer.set_shown("names")
         viewer.export(path, size=SIZE, direction=(1.0, 0.4, 0.4))
 
 
-@picture("A path", "A falling double pendulum. The program adds the path of its tip as a line.", ".webp")
+@picture("A path", "A falling double pendulum. The program draws the path of the tip as a line.", ".webp")
 def path_of_a_tip(path: str) -> None:
     rollout = dynx.simulate(
         dynx.load("dynx_double_pendulum", base_pose=dynx.Pose((0.0, 0.0, 2.2))),
@@ -248,7 +248,7 @@ def many_robots(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("A duck", "A mesh with an image as its texture. Contacts use the convex hull of the mesh.")
+@picture("A duck", "A mesh with an image as its texture. Engines use its convex hull for contacts.")
 def duck(path: str) -> None:
     with World(read_scene("duck"), "mujoco") as world:
         world.step(300)
@@ -257,7 +257,7 @@ def duck(path: str) -> None:
             viewer.export(path, size=SIZE)
 
 
-@picture("Mobile robot", "TIAGo with a text that the program adds.")
+@picture("Mobile robot", "TIAGo. The program adds the text.")
 def mobile_robot(path: str) -> None:
     with dynx.load("tiago").view(whole_meshes=True) as viewer:
         viewer.text("TIAGo", (0.35, 0.4, 0.9), colour="blue", size=26)
@@ -266,12 +266,12 @@ def mobile_robot(path: str) -> None:
 
 HEAD = """# Gallery
 
-Each picture or film was drawn by the program below it, without a browser and without a graphics processor.
-The programs need the extras `viewer`, `world`, `film` and `mujoco`. A program takes up to two minutes. In a
-clone, `python -m docs.gallery` runs all programs.
+The program below each picture or film made it. The programs need the extras `viewer`, `world`, `film` and
+`mujoco`, but no browser and no graphics processor. A program takes up to two minutes. In a clone of dynx,
+`python -m docs.gallery` runs all programs.
 
-Gymnasium's own lander (extra `train`), which `dynx play` also shows, is not on this page. This environment
-draws its own pictures.
+`dynx play` also shows Gymnasium's own lander (extra `train`). The lander is not on this page, because
+Gymnasium draws its pictures itself.
 """
 
 

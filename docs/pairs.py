@@ -17,33 +17,44 @@ PAGE = Path(__file__).with_name("pairs.md")
 
 HEAD = """# Public robots in two formats: is it the same robot?
 
-`python -m docs.pairs` writes this page from a survey. The survey runs [`dynx same`](same.md) on robots
-that public repositories describe in more than one format. A pair is a URDF file and an MJCF or SDF
-file. The URDF file is from the same repository as the other file, from another repository, or from
-example-robot-data. The two files share a word in their paths or robot names, and at least half of their
-joint names. If both are in one repository, an equal number of joints suffices instead.
+Some public repositories describe a robot in more than one format. This page states for each such pair of
+files whether both describe the same robot. `python -m docs.pairs` writes the page from the results of a
+survey, which runs [`dynx same`](same.md) on each pair.
 
-- **The list** is `benchmarks/surveys/robot_pairs.tsv`: repository, commit, path and SHA-256 of each
-  file. A program chose the pairs. For one URDF file it takes at most {most} MJCF files and {most} SDF
-  files of a repository.
-- **The tolerance is {tolerance:g}**, since the numbers in many files have four or five digits.
+A *pair* is a URDF file and an MJCF or SDF file. The URDF file may be from the same repository, from
+another repository, or from example-robot-data. A program chose pairs of files that share a word in their
+paths or robot names, and at least half of their joint names. If both files are in one repository, an equal
+number of joints is enough instead of equal joint names. For one URDF file the program takes at most {most}
+MJCF files and {most} SDF files of a repository. The list of pairs is `benchmarks/surveys/robot_pairs.tsv`,
+with repository, commit, path and SHA-256 of each file.
+
+How to read the tables:
+
+- **The tolerance is {tolerance:g}**, because the numbers in many files have four or five digits.
 - **A verdict is about rigid-body dynamics.** Limits, damping, armature, actuators and shapes do not
   affect the verdict.
 - **Different does not mean wrong.** Two files often describe two versions of a robot, or one file has a
   hand, a sensor or a fixed joint that the other file lacks.
-- **Engines without dynx check each report.** Pinocchio loads the URDF file, MuJoCo the MJCF file, and
-  Drake the SDF file. The survey compares total mass and joint-space inertia of the two engines. The
-  last column has the largest relative difference, or `-` if an engine refuses a file or the robots have
-  different joints. A difference is *missed* if the engines show it and the report lacks it. A
-  difference that remains after all named elements are replaced is missed, too.
-- **Columns.** `elements` is the number of elements that differ. `largest difference` begins with the
-  [size](same.md#what-the-report-contains) of this difference, relative to a scale of the robot.
-- **Elements are checked one by one.** After all named elements are replaced, the survey reinserts one
-  element of the original file. It counts an element that then changes neither the mass nor the
-  joint-space inertia in Pinocchio.
-- **Half of the pairs were used in development**, chosen by a hash. The other half was compared twice.
-  The list of differences that `dynx same` reports was corrected between the two runs. Neither run
-  missed a difference.
+- **`elements`** is the number of elements of the files that differ. **`joints without counterpart`** is
+  the number of joints that only one file has.
+- **`largest difference`** begins with the [size](same.md#what-the-report-contains) of the largest
+  difference, relative to a scale of the robot. Then it names the element.
+- **`engines`** has the result of an independent check. Pinocchio loads the URDF file, MuJoCo the MJCF
+  file, and Drake the SDF file, all without dynx. The column has the largest relative difference of total
+  mass and joint-space inertia between the two engines. It has `-` if an engine refuses a file or the
+  robots have different joints.
+
+The survey also checks each report of `dynx same`:
+
+- A difference is *missed* if the report says "same" and the two engines differ by more than ten times the
+  tolerance. It is missed, too, if the engines still differ by this amount after the survey has replaced
+  all elements that the report names.
+- After this replacement the survey reinserts each original element alone. If this element changes neither
+  the mass nor the joint-space inertia in Pinocchio, the report named it wrongly.
+
+Half of the pairs, chosen by a hash, were used in the development of `dynx same`. The other half was
+compared twice. Between the two runs, a fault in the list of differences was corrected. Neither run missed
+a difference.
 
 """
 

@@ -552,10 +552,11 @@ def summary(results: Sequence[PairResult]) -> str:
     judged_ones = [each for each in results if each.engines is not None or each.mended is not None]
     reinserted = sum(each.reinserted for each in results)
     return (
-        f"{len(results)} pairs: {words['same']} the same robot, {words['different']} different, "
-        f"{words['refused']} refused. Engines check {len(judged_ones)}. Pairs with a difference that engines "
-        f"see and dynx does not name: {sum(map(missed, results))}. Of {reinserted} elements that were "
-        f"reinserted alone, {sum(len(each.unreal) for each in results)} have no effect in Pinocchio."
+        f"{len(results)} pairs: in {words['same']} pairs both files describe the same robot, in "
+        f"{words['different']} they differ, and {words['refused']} pairs are refused. Engines checked "
+        f"{len(judged_ones)} pairs, and show a missed difference in {sum(map(missed, results))}. Of "
+        f"{reinserted} reinserted elements, {sum(len(each.unreal) for each in results)} have no effect in "
+        "Pinocchio."
     )
 
 
