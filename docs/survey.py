@@ -74,8 +74,9 @@ def page(entries: Sequence[Entry]) -> str:
         "",
         "Written by `python -m docs.survey`. Each engine loads every file by the call that users of the "
         "engine make, with a fixed and with a floating base. dynx compares the results with reference values "
-        "([doctor](doctor.md)). A file *differs* if a result of at least one engine differs from them. A "
-        "file is *refused* if dynx cannot read it. The tables list only proved causes, each with the number "
+        "([doctor](doctor.md)). A file *differs* if an engine refuses it, cannot be used for it, or has "
+        "a result that differs from the reference values by more than 1e-12. A file is *refused* if dynx "
+        "cannot read it. The tables list only proved causes, each with the number "
         "of its places in the file, and with the engines that it affects. The effect of a cause is the "
         "change of an engine's result when dynx removes only this cause, relative to the largest reference "
         "value. If several places or engines have the cause, the table has the largest effect. `no answer` "

@@ -181,7 +181,7 @@ def differs(entry: Entry, above: float | None = None) -> bool:
 
 
 def counts(entries: Sequence[Entry]) -> str:
-    """Summarise as in ``69 files: 1 refused, 46 differ, 0 with something unexplained``."""
+    """Summarise as in ``69 files: 1 refused, 46 differ, 0 with an unexplained difference``."""
     failed = sum("failed" in entry for entry in entries)
     of = [entry for entry in entries if "failed" not in entry]
     refused = sum(entry["error"] is not None for entry in of)
@@ -190,7 +190,7 @@ def counts(entries: Sequence[Entry]) -> str:
     left = sum(bool(entry["unexplained"]) for entry in of)
     text = (
         f"{len(entries)} files: {refused} refused, {different} differ ({large} by more than {SMALL:g}), "
-        f"{left} with something unexplained"
+        f"{left} with an unexplained difference"
     )
     return text + (f", {failed} not done" if failed else "")
 
