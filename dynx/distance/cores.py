@@ -110,6 +110,7 @@ class BoxCore(Core):
     def __init__(self, halves: Floats) -> None:
         super().__init__(0.0, math.hypot(*halves.tolist()))
         self._halves = halves
+        self.halves: list[float] = halves.tolist()
 
     def place(self, R: Floats, p: Vector3) -> Core:
         super().place(R, p)

@@ -66,7 +66,7 @@ def distance(
     For a mesh dynx uses the convex hull, for a plane the half-space. Raises ArgumentError for two planes and
     for objects that are not convex shapes, the errors of `Mesh.hull`, and the errors of invalid poses.
     """
-    poses = _checked_pose("T_a", T_a), _checked_pose("T_b", T_b)
+    poses = checked_distance_pose("T_a", T_a), checked_distance_pose("T_b", T_b)
     found = distance_of_cores(_core_of(shape_a, "shape_a"), poses[0], _core_of(shape_b, "shape_b"), poses[1])
     assert found is not None
     return found
@@ -77,7 +77,9 @@ def support(shape: ConvexShape | Plane, T: Pose | ArrayLike, direction: ArrayLik
 
     For a plane h is infinite along all directions but its normal.
     """
-    return _support(_core_of(shape, "shape"), _checked_pose("T", T), checked_vector("direction", direction))
+    return _support(
+        _core_of(shape, "shape"), checked_distance_pose("T", T), checked_vector("direction", direction)
+    )
 
 
 def _support(core: Core | None, pose: Floats, direction: Floats) -> tuple[float, Floats]:
@@ -107,7 +109,7 @@ def separation(
     It is a lower bound of the signed distance for every normal, and equal to it for the best.
     """
     a, b = _core_of(shape_a, "shape_a"), _core_of(shape_b, "shape_b")
-    T_a, T_b = _checked_pose("T_a", T_a), _checked_pose("T_b", T_b)
+    T_a, T_b = checked_distance_pose("T_a", T_a), checked_distance_pose("T_b", T_b)
     n = checked_vector("normal", normal)
     # Far from the origin of the world the digits of a difference of heights would be lost.
     near_a, near_b = T_a.copy(), T_b.copy()
@@ -208,7 +210,7 @@ def _tuple(vector: Floats) -> Vector3:
     return x, y, z
 
 
-def _checked_pose(name: str, T: Pose | ArrayLike) -> Floats:
+def checked_distance_pose(name: str, T: Pose | ArrayLike) -> Floats:
     """Return a pose as a matrix, as it is: not the nearest rotation."""
     if isinstance(T, Pose):
         return checked_pose(name, T).matrix

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from dynx.distance.cores import Core, HullCore, core_of
+from dynx.distance.cores import Core, Hull, HullCore, core_of
 from dynx.distance.distance import Distance, distance_of_cores
 from dynx.model.geometry import HeightField, Mesh, Plane, Shape
 from dynx.spatial.scalar import Floats
@@ -70,7 +70,7 @@ class Field:
 class Solid:
     """A shape of a rigid body, prepared for distances, with a ball around it."""
 
-    def __init__(self, shape: Shape, T: Floats) -> None:
+    def __init__(self, shape: Shape | Hull, T: Floats) -> None:
         """`T` (4, 4) is the pose of the shape in the frame of its owner."""
         self.T = T
         self.field = Field(shape) if isinstance(shape, HeightField) else None

@@ -1,0 +1,247 @@
+"""Contact points of two shapes: where and along which normal they touch, overlap, or may touch soon."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from dynx.distance.box_separation import box_separation
+from dynx.distance.contact_reduction import TIE, ContactCandidate, reduced
+from dynx.distance.cores import BoxCore, CylinderCore, EllipsoidCore, HullCore, PointCore, SegmentCore
+from dynx.distance.distance import distance_of_cores
+from dynx.distance.overlap_polygon import INSIDE, overlap
+from dynx.distance.placed_solids import PlacedSolid, placed_cores
+from dynx.distance.plane_contacts import plane_candidates
+from dynx.distance.support_features import ContactFrame, SupportFeature, frame_along, support_feature
+from dynx.errors import ArgumentError
+from dynx.spatial.plain import Vector3, dot
+
+NEAREST = -2
+"""Number of the nearest point of a shape, which belongs to none of its features."""
+
+MARGIN = 1e-7
+"""Distance outside of a feature, relative to the size of the shapes, that counts as inside."""
+
+
+class ContactPoint(NamedTuple):
+    """A pair of points of two surfaces that face each other, in world axes."""
+
+    point_a: Vector3
+    """Point (3,) on the surface of a [m]."""
+    point_b: Vector3
+    """Point (3,) on the surface of b [m]."""
+    normal: Vector3
+    """Unit vector (3,) from b to a."""
+    gap: float
+    """Distance (point_a - point_b) . normal [m]; negative where the shapes overlap."""
+    feature: tuple[int, int]
+    """Numbers of the vertices or edges of a and of b that meet here. They stay the same from step to step as
+    long as the same parts touch."""
+
+    def swapped(self) -> ContactPoint:
+        """Return the contact point of b and a."""
+        x, y, z = self.normal
+        return ContactPoint(self.point_b, self.point_a, (-x, -y, -z), self.gap, self.feature[::-1])
+
+
+def contact_points(a: PlacedSolid, b: PlacedSolid, within: float, limit: int = 4) -> tuple[ContactPoint, ...]:
+    """Return the contact points of two shapes whose gap is at most `within` [m], at most `limit` of them.
+
+    The least gap is the signed distance of the shapes. Of more points, those of the largest area remain, and
+    the deepest one. Raises ArgumentError for two grounds (planes, height fields), and for a limit below 1.
+    """
+    if limit < 1:
+        raise ArgumentError(f"limit is {limit}; wanted at least 1 contact point")
+    order_a, order_b = _order(a), _order(b)
+    if order_a > order_b or (order_a == order_b and _position_order(a, b)):
+        return tuple(each.swapped() for each in _in_order(b, a, within, limit))
+    return _in_order(a, b, within, limit)
+
+
+_KINDS = {PointCore: 0, SegmentCore: 1, EllipsoidCore: 2, CylinderCore: 3, BoxCore: 4, HullCore: 5}
+_PLANE, _FIELD = 6, 7
+
+_CURVED = (PointCore, EllipsoidCore)
+"""Cores of shapes that touch others at one point."""
+
+_SKEW = (0.5327, 0.6071, 0.5896)
+"""Direction along which the positions of equal shapes are compared; no shapes are placed along it."""
+
+
+def _order(solid: PlacedSolid) -> tuple[float, ...]:
+    """Return numbers that decide which of two shapes comes first: exchanged shapes exchange the result."""
+    core = solid.solid.core
+    if core is None:
+        return (_PLANE,) if solid.solid.field is None else (_FIELD,)
+    return _KINDS[type(core)], core.extent, core.radius
+
+
+def _position_order(a: PlacedSolid, b: PlacedSolid) -> bool:
+    return dot(a.p, _SKEW) < dot(b.p, _SKEW)
+
+
+def _in_order(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tuple[ContactPoint, ...]:
+    """Return the contact points of two shapes of which the second is of a later kind."""
+    core_a, core_b = a.solid.core, b.solid.core
+    if core_a is None:
+        raise ArgumentError("both shapes are grounds; grounds have no contact points with each other")
+    if core_b is None:
+        if b.solid.field is not None:
+            return ()
+        normal, found, size = plane_candidates(a, b, within)
+        return _contacts(reduced(found, limit, size), normal)
+    if isinstance(core_a, PointCore) and isinstance(core_b, PointCore):
+        return _of_points((a.p, core_a.radius, 0), (b.p, core_b.radius, 0), within)
+    if isinstance(core_a, PointCore | SegmentCore) and isinstance(core_b, SegmentCore):
+        return _of_capsules(a, b, within, limit)
+    if isinstance(core_a, BoxCore) and isinstance(core_b, BoxCore):
+        return _of_boxes(a, core_a, b, core_b, within, limit)
+    return _of_convex(a, b, within, limit)
+
+
+def _contacts(candidates: list[ContactCandidate], normal: Vector3) -> tuple[ContactPoint, ...]:
+    return tuple(ContactPoint(c.point_a, c.point_b, normal, c.gap, c.feature) for c in candidates)
+
+
+def _of_points(
+    a: tuple[Vector3, float, int], b: tuple[Vector3, float, int], within: float
+) -> tuple[ContactPoint, ...]:
+    """Return the contact point of two balls: centre, radius, and number of the feature of each."""
+    (ax, ay, az), radius_a, part_a = a
+    (bx, by, bz), radius_b, part_b = b
+    x, y, z = ax - bx, ay - by, az - bz
+    length = math.sqrt(x * x + y * y + z * z)
+    gap = length - radius_a - radius_b
+    if gap > within:
+        return ()
+    x, y, z = (x / length, y / length, z / length) if length > 0.0 else (0.0, 0.0, 1.0)
+    on_a = ax - radius_a * x, ay - radius_a * y, az - radius_a * z
+    on_b = bx + radius_b * x, by + radius_b * y, bz + radius_b * z
+    return (ContactPoint(on_a, on_b, (x, y, z), gap, (part_a, part_b)),)
+
+
+def _of_capsules(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tuple[ContactPoint, ...]:
+    """Return the contact points of two capsules, or of a ball and a capsule: at the nearest points of the
+    axes, and at the ends beside which the other axis runs."""
+    core_a, core_b = a.solid.core, b.solid.core
+    assert isinstance(core_a, PointCore | SegmentCore)
+    assert isinstance(core_b, SegmentCore)
+    half_a = core_a.half if isinstance(core_a, SegmentCore) else 0.0
+    half_b = core_b.half
+    (ax, ay, az), (bx, by, bz) = a.axes[2], b.axes[2]
+    x, y, z = a.p[0] - b.p[0], a.p[1] - b.p[1], a.p[2] - b.p[2]
+    cosine = ax * bx + ay * by + az * bz
+    along_a, along_b = -(x * ax + y * ay + z * az), x * bx + y * by + z * bz
+    # Pairs of places on both axes.
+    pairs: list[tuple[float, float, int, int]] = []
+    cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    square = cx * cx + cy * cy + cz * cz
+    if half_a > 0.0:
+        if square > 1e-16:
+            s = (along_a + cosine * along_b) / square
+            s = min(max(s, -half_a), half_a)
+        else:
+            s = min(max(along_a, -half_a), half_a)
+        t = min(max(along_b + cosine * s, -half_b), half_b)
+        s = min(max(along_a + cosine * t, -half_a), half_a)
+        ends = [(-half_a, 0), (half_a, 1)]
+        for s_end, k in ends:
+            t_end = along_b + cosine * s_end
+            if -half_b <= t_end <= half_b:
+                pairs.append((s_end, t_end, k, INSIDE))
+        for t_end, k in ((-half_b, 0), (half_b, 1)):
+            s_end = along_a + cosine * t_end
+            if -half_a <= s_end <= half_a:
+                pairs.append((s_end, t_end, INSIDE, k))
+    else:
+        s, t = 0.0, min(max(along_b, -half_b), half_b)
+    pairs.append((s, t, NEAREST, NEAREST))
+    found: list[ContactCandidate] = []
+    normals: dict[tuple[int, int], Vector3] = {}
+    for s, t, part_a, part_b in pairs:
+        on_a = a.p[0] + s * ax, a.p[1] + s * ay, a.p[2] + s * az
+        on_b = b.p[0] + t * bx, b.p[1] + t * by, b.p[2] + t * bz
+        for each in _of_points((on_a, core_a.radius, part_a), (on_b, core_b.radius, part_b), within):
+            if dot(each.normal, each.normal) > 0.0:
+                normals[each.feature] = each.normal
+                found.append(ContactCandidate(t, 0.0, each.gap, each.point_a, each.point_b, each.feature))
+    size = half_a + half_b + core_a.radius + core_b.radius
+    return tuple(
+        ContactPoint(c.point_a, c.point_b, normals[c.feature], c.gap, c.feature)
+        for c in reduced(found, min(limit, 2), size)
+    )
+
+
+def _of_boxes(
+    a: PlacedSolid, core_a: BoxCore, b: PlacedSolid, core_b: BoxCore, within: float, limit: int
+) -> tuple[ContactPoint, ...]:
+    between = a.p[0] - b.p[0], a.p[1] - b.p[1], a.p[2] - b.p[2]
+    found = box_separation(a.axes, core_a.halves, b.axes, core_b.halves, between, within)
+    if found is None:
+        return ()
+    separation, normal = found
+    size = core_a.extent + core_b.extent
+    candidates = _candidates(a, b, between, frame_along(normal), within, size)
+    # Separated boxes are farther apart than along each axis, unless two of their points show that distance.
+    least = min((each.gap for each in candidates), default=math.inf)
+    if separation > 0.0 and least > separation + TIE * size:
+        return _of_convex(a, b, within, limit)
+    return _contacts(reduced(candidates, limit, size), normal)
+
+
+def _candidates(
+    a: PlacedSolid, b: PlacedSolid, between: Vector3, frame: ContactFrame, within: float, size: float
+) -> list[ContactCandidate]:
+    """Return the places of the features of two shapes at which the gap is at most `within`."""
+    feature_a = support_feature(a, between, frame, -1.0)
+    feature_b = support_feature(b, (0.0, 0.0, 0.0), frame, 1.0)
+    return candidates_of_features(feature_a, feature_b, frame, b.p, within, size)
+
+
+def candidates_of_features(
+    feature_a: SupportFeature,
+    feature_b: SupportFeature,
+    frame: ContactFrame,
+    origin: Vector3,
+    within: float,
+    size: float,
+) -> list[ContactCandidate]:
+    """Return the places of two features at which the gap is at most `within`."""
+    ox, oy, oz = origin
+    found: list[ContactCandidate] = []
+    for u, v, height_a, height_b, part_a, part_b, du, dv in overlap(
+        feature_a, feature_b, MARGIN * size, within
+    ):
+        gap = height_a - height_b
+        if gap <= within:
+            ax, ay, az = frame.point(u, v, height_a)
+            bx, by, bz = frame.point(u + du, v + dv, height_b)
+            on_a, on_b = (ox + ax, oy + ay, oz + az), (ox + bx, oy + by, oz + bz)
+            found.append(ContactCandidate(u, v, gap, on_a, on_b, (part_a, part_b)))
+    return found
+
+
+def _of_convex(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tuple[ContactPoint, ...]:
+    """Return the contact points of two bounded shapes by their distance and the features along its normal."""
+    core_a, core_b, between = placed_cores(a, b)
+    T_a, T_b = a.T, b.T
+    T_a[:3, 3], T_b[:3, 3] = between, 0.0
+    nearest = distance_of_cores(core_a, T_a, core_b, T_b, within)
+    if nearest is None or nearest.distance > within:
+        return ()
+    x, y, z = nearest.normal.tolist()
+    normal = x, y, z
+    size = core_a.extent + core_a.radius + core_b.extent + core_b.radius
+    candidates: list[ContactCandidate] = []
+    if not isinstance(core_a, _CURVED) and not isinstance(core_b, _CURVED):
+        candidates = _candidates(a, b, between, frame_along(normal), within, size)
+    least = min((each.gap for each in candidates), default=math.inf)
+    if least > nearest.distance + TIE * size:
+        ox, oy, oz = b.p
+        (ax, ay, az), (bx, by, bz) = nearest.point_a.tolist(), nearest.point_b.tolist()
+        on_a, on_b = (ox + ax, oy + ay, oz + az), (ox + bx, oy + by, oz + bz)
+        gap = (ax - bx) * x + (ay - by) * y + (az - bz) * z
+        frame = frame_along(normal)
+        place = dot(frame.u, (ax, ay, az)), dot(frame.v, (ax, ay, az))
+        candidates.insert(0, ContactCandidate(*place, gap, on_a, on_b, (NEAREST, NEAREST)))
+    return _contacts(reduced(candidates, limit, size), normal)
