@@ -56,7 +56,7 @@ EXAMPLES = {
         "FeedForward FrictionCompensation GravityCompensatedPD Impedance MomentumObserver "
         "MotorLag OpenLoop OperationalSpace PD PID Saturated model_dynamics"
     ),
-    "dynx.distance": "Hull distance",
+    "dynx.distance": "Hull contact_points distance",
     "dynx.envs": "Randomization make_environment",
     "dynx.ik": "FrameTarget closed_form",
     "dynx.ik.tracking": "track",
