@@ -24,7 +24,7 @@ class SettingsChange:
 
     values: Mapping[str, tuple[Any, ...]]
     reason: str
-    """Part that the setting plays in the engine, as a sentence."""
+    """Effect of the setting in the engine, as a sentence."""
 
     @property
     def changes(self) -> list[dict[str, Any]]:
@@ -192,4 +192,5 @@ CANDIDATES: Mapping[str, tuple[SettingsChange, ...]] = {
         ),
     ),
 }
-"""Candidates by engine; an engine that is not named has none, and its errors that stay are unexplained."""
+"""Settings by engine to which errors may be attributed. Errors of other engines that do not fall are
+unexplained."""

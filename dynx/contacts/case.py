@@ -26,7 +26,7 @@ class Figure:
     """Noun phrase, unique within a trial of the case."""
     measured: float
     exact: float
-    """The value that mechanics gives; the least one where it gives bounds."""
+    """Value that mechanics gives, or its lower bound."""
     unit: str
     """Unit in which both are given, such as ``m/s``; empty for a ratio."""
     scale: float
@@ -81,7 +81,7 @@ class ContactCase(ABC):
     trials: ClassVar[Mapping[str, Any]] = {"": None}
     """Parameters by the name of the trial; the name is empty where a case has one trial only."""
     contact_interval: ClassVar[float | None] = None
-    """Time [s] of which `World.mean_contacts` gives the mean to `measure`; None where it is not read."""
+    """Interval [s] of `World.mean_contacts`, if `measure` calls it; otherwise None."""
 
     @abstractmethod
     def scene(self, parameters: Any) -> Scene:

@@ -28,7 +28,7 @@ MIN_STEP, MAX_STEP = 1e-6, 0.1
 MAX_SUBSTEPS = 500
 
 STEPS = (4e-3, 2e-3, 1e-3)
-"""Steps [s] where none are given."""
+"""Default steps [s]."""
 
 TIMEOUT = 60.0
 """Time [s] after which one run is ended."""
@@ -41,11 +41,11 @@ class FigureResult:
     engine: str
     case: str
     trial: str
-    """Name of the trial; empty where the case has one only."""
+    """Name of the trial; empty if the case has only one."""
     figure: str
     unit: str
     exact: float
-    """The value that mechanics gives, or the least one."""
+    """Value that mechanics gives, or its lower bound."""
     scale: float
     """Magnitude by which errors are divided."""
     tolerance: float
@@ -81,7 +81,7 @@ class Conformance:
     engines: tuple[str, ...]
     cases: tuple[ContactCase, ...]
     settings: Mapping[str, Mapping[str, Any]]
-    """Settings given, by engine."""
+    """Settings that the caller gave, by engine."""
     results: tuple[FigureResult, ...]
     refusals: tuple[NoResult, ...]
     """Trials that an engine cannot represent and refuses by name."""
@@ -94,7 +94,7 @@ class Conformance:
     not_done: int = 0
     """Number of trials of an engine that an interruption left without a verdict."""
     in_effect: Mapping[str, Mapping[str, tuple[float, ...]]] = field(default_factory=dict)
-    """Values at each step, by engine, of settings given that the engine changes."""
+    """Values in effect at each step, by engine, of those given settings that the engine changes."""
 
     @checks_types
     def count(self, kind: VerdictKind, engine: str | None = None) -> int:

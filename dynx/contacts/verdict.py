@@ -53,12 +53,12 @@ class Attribution:
     values: Mapping[str, tuple[Any, ...]]
     """Values by the name of the setting: the one in use, then those that were tried, in order."""
     reason: str
-    """Part that the setting plays in the engine."""
+    """Effect of the setting in the engine."""
     errors: tuple[tuple[float, ...], ...]
     """Relative errors at every step, for each of the values in turn."""
     outcome: AttributionOutcome
     order: float | None
-    """Order at which the error then falls with the step, under ``falls``, or with the setting, under
+    """Order at which the error then falls: with the step if `outcome` is ``falls``, with the setting if it is
     ``proportion``."""
     price: tuple[Price, ...] = ()
     """Errors of other figures of the case that the last change makes worse."""
@@ -80,11 +80,11 @@ class Verdict:
 
     kind: VerdictKind
     order: float | None = None
-    """Order at which the error falls with the step, under ``falls``."""
+    """Order at which the error falls with the step, if the verdict is ``falls``."""
     attribution: Attribution | None = None
-    """The setting, under ``setting``."""
+    """Setting that causes the error, if the verdict is ``setting``."""
     reason: str | None = None
-    """Why the engine cannot give the exact value, under ``cannot``."""
+    """Reason why the engine cannot give the exact value, if the verdict is ``cannot``."""
 
 
 class TrialOfEngine(NamedTuple):

@@ -240,7 +240,7 @@ class DoctorReport:
     meshes: int = 0
     """Number of mesh files that the description names."""
     unread_meshes: tuple[UnreadMesh, ...] = ()
-    """Those of them that were not read."""
+    """Number of these mesh files that were not read."""
     refusal: LoadFailure | None = None
     """Error with which `dynx.load` refuses the file as it is, though it was examined; None where it loads."""
     causes_searched: bool = field(default=True, compare=False)
@@ -255,7 +255,7 @@ class DoctorReport:
     text: str | None = field(default=None, compare=False)
     """Text that was examined, for excerpts."""
     form: TextForm | None = field(default=None, compare=False)
-    """Encoding and ends of the mended text, which are those of the file where they are sound."""
+    """Encoding and line ends of the mended text: those of the file, if they are valid."""
     seconds: float = field(default=0.0, compare=False)
 
     @property

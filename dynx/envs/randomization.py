@@ -136,7 +136,7 @@ class Randomization:
     delay: Range | None = None
     """Time from an action until it acts [s]."""
     observation_noise: Range | Mapping[int | str, Range] | None = None
-    """Standard deviation of Gaussian noise on observations: of all entries, or by the number of the entry."""
+    """Standard deviation of Gaussian noise on observations: of all entries, or by the index of the entry."""
     action_noise: Range | Mapping[int | str, Range] | None = None
     """Standard deviation of Gaussian noise on the numbers of actions, which are clamped to their space."""
 

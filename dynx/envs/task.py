@@ -221,7 +221,7 @@ class State(NamedTuple):
     v: Array
     """Velocity (nv,) [rad/s or m/s]."""
     memory: Array = NO_MEMORY
-    """Numbers of the task's own (k,), such as the goal of the episode."""
+    """Numbers (k,) that the task keeps, such as the goal of the episode."""
 
 
 SCHEMES: dict[str, Callable[[Model, float], Any]] = {
@@ -394,7 +394,7 @@ class Episode:
     world: World
     rng: np.random.Generator
     memory: SimpleNamespace
-    """Values of the task's own, as attributes, such as the goal of the episode."""
+    """Values that the task keeps, as attributes, such as the goal of the episode."""
 
 
 class WorldTask(Task):

@@ -210,34 +210,34 @@ class Options:
     """Point (3,) [m], in the axes of the frame, that reaches the target position instead of its origin."""
     weights: ArrayLike | None = None
     """Weights (6,) of the errors in position x, y, z [1/m] and rotation x, y, z [1/rad]; 0 is free. They
-    decide what is given up where not everything can be reached."""
+    decide which errors remain if not all can be zero."""
     position_tolerance: ArrayLike = 1e-6
     """Greatest distance [m]; or three bounds along x, y, z, which may be infinite."""
     rotation_tolerance: ArrayLike = 1e-6
     """Greatest angle [rad]; or three bounds on the rotation about x, y, z, which may be infinite."""
     axes: str = "target"
-    """Axes of free axes, weights and tolerances: those of the ``"target"`` pose, with which the frame's
-    coincide when it is reached, or of the ``"world"``, as always for positions (..., 3)."""
+    """Axes to which free axes, weights and tolerances refer: those of the ``"target"`` pose or of the
+    ``"world"``. For positions (..., 3) they are always those of the world."""
     limit_margin: ArrayLike = 0.0
     """Least distance from the position limits [rad or m]: one number, or one for each coordinate (nq,)."""
     nearest: ArrayLike | None = None
-    """Configurations (..., nq): of several solutions the one whose joints have the least distance (root of
-    the sum of squares [rad, m]) is returned, and redundant joints come as near as the target permits."""
+    """Configurations (..., nq): the search returns the solution nearest to it (root of the sum of squares
+    [rad, m]), and redundant joints come as near to it as the target permits."""
     maximize: str | None = None
-    """What the choice among solutions and the redundant joints make great: ``"manipulability"`` (square root
-    of det J J') or ``"limit_distance"`` (minus the sum, over joints with two limits, of the squared distance
-    from the middle of the range in units of half the range)."""
+    """Quantity that the choice among solutions and the redundant joints maximise: ``"manipulability"``
+    (square root of det J J') or ``"limit_distance"`` (minus the sum, over joints with two limits, of the
+    squared distance from the middle of the range in units of half the range)."""
     avoid: AvoidanceSource | None = None
-    """What the robot is to keep away from: a `dynx.world.Scene`, or a `World` as it stands now, with a margin
-    of 0.01 m; or what their method `avoidance` returns for other margins [m]. Links of the robot keep away
-    from one another as well."""
+    """Obstacles: a `dynx.world.Scene`, or a `World` in its present state, with a margin of 0.01 m; or the
+    result of their method `avoidance`, for other margins [m]. Links of the robot also keep away from one
+    another."""
     max_iterations: int = 50
-    """Most steps of each start."""
+    """Largest number of steps from each start."""
     max_restarts: int = 200
-    """Most starts after the first."""
+    """Largest number of starts after the first."""
     timeout: float | None = None
     """Time [s] after which the search stops with the best configuration found so far (status TIMED_OUT), to
-    within 10 %; None for any. Compiling or loading the kernels of a robot, once, does not count."""
+    within 10 %; None for no limit. Compiling or loading the kernels of a robot, once, does not count."""
     rng: np.random.Generator | int | None = 0
     """Seed or generator of the random starts."""
     method: str = "dynx"

@@ -53,7 +53,7 @@ class IKResult:
     that is not the failure."""
     timed_out: NDArray[np.bool_] | None = field(default=None, kw_only=True)
     """True (...,) where `timeout` ended the search before it was complete: q is the best found so far, which
-    may reach the target if only the choice among solutions was cut short. None stands for nowhere."""
+    may reach the target if only the choice among solutions was cut short. None means False everywhere."""
     by_frame: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict, kw_only=True)
     """Position error (...,) [m] and rotation error (...,) [rad] of each frame, if there are several; those of
     the result are the largest."""

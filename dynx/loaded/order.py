@@ -50,7 +50,7 @@ class EngineOrder:
     engine: str
     model: Model
     coordinates: EngineCoordinates
-    """Those of all joints of the file that move, also of those that are locked in the model or follow
+    """Coordinates of all joints of the file that move, also of those that are locked in the model or follow
     others."""
     joint_names: tuple[str, ...]
     """Names of these joints."""

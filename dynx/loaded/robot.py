@@ -85,7 +85,7 @@ class EngineBase:
     angular_in_world: bool
     """True if the angular velocity is in axes of the world, False in those of the base."""
     T_base_frame: Floats = field(default_factory=lambda: np.eye(4))
-    """Pose (4, 4) of the frame of which these are position and velocity, in that of dynx."""
+    """Pose (4, 4) of the engine's base frame, to which these entries refer, in dynx's base frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +134,8 @@ class LoadedRobot(ABC):
     """Engine settings that are remedies at run time: id -> the line of code a user would write."""
 
     STEP_DEFAULTS: ClassVar[Mapping[str, str]] = {}
-    """What a step of the engine does by itself, though no file states it: what it does -> the line of code
-    that switches it off. No result here includes it."""
+    """Effects that a step of the engine adds although no file states them: effect -> the line of code that
+    switches it off. No result of this class includes them."""
 
     refuses_without: ClassVar[tuple[str, ...]] = ()
     """The parts of a link, ``visual`` or ``collision``, for whose missing mesh file the engine refuses the

@@ -111,8 +111,8 @@ class Rule(ABC):
     """Words joined by hyphens, such as ``link-without-inertial``."""
 
     title: ClassVar[str]
-    """The cause in one sentence. Like `advice` and `choices`, it names an engine only where the rule concerns
-    this one alone: a user may have asked for others."""
+    """The cause in one sentence. Like `advice` and `choices`, it names an engine only if the rule concerns no
+    other engine, because a user may examine other engines."""
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf",)
     """Formats of the files in which the rule looks for its cause; the trap is of the first."""
@@ -127,9 +127,9 @@ class Rule(ABC):
     (``pybullet:plain``) is named where it alone is meant."""
 
     stated: ClassVar[bool] = False
-    """True if neither an edit nor a call removes the cause: an importer leaves something out. Its effect
-    is then what remains of the difference in the engines that the rule names, without all other causes,
-    and is not proved; a test shows it on the trap, beside the same file without the cause.
+    """True if neither an edit nor a call removes the cause: an importer leaves something out. The effect of
+    the cause is then the difference that remains, in the engines that the rule names, after all other causes
+    are removed. It is not proved; a test shows it on the trap and on the same file without the cause.
     """
 
     stated_refusal: ClassVar[bool] = False

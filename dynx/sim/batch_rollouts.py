@@ -55,8 +55,8 @@ class BatchRollouts:
     tau_record: Floats  # (n, kept, nv)
     saturated: Floats  # (n, nv), the share of steps at the effort limit
     own_parameters: bool | None = False
-    """True if rollouts had `parameters` of their own, which are not recorded; None of a file that does not
-    say."""
+    """True if rollouts had `parameters` of their own, which are not recorded; None if a file does not state
+    it."""
 
     @property
     def joint_names(self) -> tuple[str, ...]:

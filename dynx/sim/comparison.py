@@ -525,11 +525,10 @@ class RolloutComparison:
     causes: tuple[Cause, ...]
     """All differences of the scenarios, the one with the largest effect first."""
     remaining: float | None
-    """Largest distance between their rollout and a rerun of our scenario with all differences taken over;
-    None where it cannot be simulated."""
+    """Largest distance between `theirs` and a rerun of the scenario of `ours` with all differences taken
+    over; None if it cannot be simulated."""
     repeated: float | None
-    """Largest distance between our rollout and a rerun of its own scenario; None where it cannot be
-    simulated."""
+    """Largest distance between `ours` and a rerun of its own scenario; None if it cannot be simulated."""
     notes: tuple[str, ...]
 
     @property

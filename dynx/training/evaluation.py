@@ -67,7 +67,8 @@ def evaluate(
     seed: int = 0,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Evaluation:
-    """Run whole episodes in several environments of one task, the next in the first that is free.
+    """Run whole episodes in several environments of one task; each starts in the first environment that is
+    free.
 
     Episode k begins with ``reset(seed=seed + k)``, the same on every engine. Every episode counts, long or
     short. `progress` is called with the number of episodes that have ended.

@@ -79,5 +79,6 @@ PUBLISHED: Mapping[str, Mapping[str, Recipe]] = {"ppo": PPO}
 
 @checks_types
 def recipe_of(algorithm: str, task: str) -> Recipe:
-    """Return the published recipe of a task such as ``dynx/CartPole-v0``; without one, the defaults."""
+    """Return the published hyperparameters for a task such as ``dynx/CartPole-v0``, or the defaults if there
+    are none."""
     return PUBLISHED.get(algorithm, {}).get(bare_name(task), Recipe())

@@ -24,7 +24,8 @@ def judge(
     deterministic: bool = True,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Evaluation:
-    """Run whole episodes of a policy on a task, as `evaluate` does, in environments made for it."""
+    """Run whole episodes of a policy on a task, as `evaluate` does, in environments that it makes and
+    closes."""
     whole_number("episodes", episodes, 1, MAX_EPISODES)
     envs: list[Env[Any, Any]] = []
     try:

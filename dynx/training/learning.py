@@ -38,7 +38,7 @@ EVALUATION_SEED = 1_000_000_000
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run is: steps done and wanted, and the mean return of the last hundred episodes, if any
+    """Progress of a run: steps done and wanted, and the mean return of the last hundred episodes, if any
     ended."""
 
     steps: int
@@ -57,9 +57,10 @@ class Progress:
 class Schedule:
     """Schedule of checkpoints and evaluations of a training run, and the return at which the run ends early.
 
-    Steps between checkpoints and between evaluations (None: `CHECKPOINTS_PER_RUN` and `EVALUATIONS_PER_RUN`
-    in all), episodes of an evaluation, threads of PyTorch, and whether curves are written for TensorBoard.
-    The first evaluation with a mean return of at least `target_return` ends the training; None: none does.
+    The fields are the number of steps between checkpoints and between evaluations (None:
+    `CHECKPOINTS_PER_RUN` checkpoints and `EVALUATIONS_PER_RUN` evaluations in the whole run), episodes of an
+    evaluation, threads of PyTorch, and whether curves are written for TensorBoard. The first evaluation with
+    a mean return of at least `target_return` ends the training; with None no evaluation ends it.
     """
 
     checkpoint_every: int | None = None

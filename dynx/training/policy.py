@@ -72,9 +72,9 @@ class Scaling:
 class Policy:
     """A policy that was trained with `spec` for `steps_done` steps.
 
-    Called with one observation, or several (n, ...), it returns as many actions: the likeliest, or random
-    ones with `deterministic` False. `algorithm` is that of stable-baselines3, or the network in NumPy, which
-    has the likeliest action alone.
+    A call with one observation, or with several (n, ...), returns one action for each: the likeliest action,
+    or with ``deterministic=False`` a random one. `algorithm` is an object of stable-baselines3, or the
+    network in NumPy, which gives only the likeliest action.
     """
 
     def __init__(
@@ -101,10 +101,10 @@ class Policy:
 
     @checks_types
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the policy: a file that stable-baselines3 loads, which acts there as here, with its origin
-        added.
+        """Write the policy to a file, with its origin. stable-baselines3 also loads the file and gives the
+        same actions.
 
-        Raises ArgumentError for a policy whose network is in NumPy: it has not all that a file holds.
+        Raises ArgumentError for a policy whose network is in NumPy, because it lacks parts that a file needs.
         """
         if isinstance(self.algorithm, PolicyNetwork):
             raise ArgumentError(
@@ -178,15 +178,15 @@ def load_policy(
 ) -> Policy:
     """Load a policy, for the task that it was trained on or for `task`, such as the same on another engine.
 
-    `network` says what computes it: ``"torch"``, by stable-baselines3, or ``"numpy"``, which needs neither of
-    them, has the likeliest action alone and differs by rounding in single precision. By default it is
-    PyTorch where stable-baselines3 is installed, else NumPy.
+    `network` selects what computes the actions. ``"torch"`` needs PyTorch and stable-baselines3. ``"numpy"``
+    needs neither of them, gives only the likeliest action, and differs by rounding in single precision. The
+    default is ``"torch"`` if stable-baselines3 is installed, otherwise ``"numpy"``.
 
     dynx reads only tensors and JSON from the file, so loading it runs no code and opens no other file. The
-    file names a registered task, with options that are numbers, words and robots. A task of your own, an id
-    ``module:Env-v0`` and options that name a file are given as `task`, which is also the task of the policy
-    then. Raises ArgumentError for a file that is no policy, is damaged, or has a policy for other
-    observations or actions, and for networks that NumPy does not compute.
+    file names a registered task, with options that are numbers, words and robots. Give a task of your own, an
+    id ``module:Env-v0`` or options that name a file as `task`; it is then the task of the policy. Raises
+    ArgumentError for a file that is no policy, is damaged, or has a policy for other observations or actions,
+    and for networks that NumPy does not compute.
     """
     if network is not None and network not in NETWORKS:
         raise ArgumentError(f"network is {shown(network)}{nearest(network, NETWORKS)}")

@@ -56,15 +56,15 @@ def train(
     final_episodes: int = 100,
     progress: Callable[[Progress], object] = lambda _: None,
 ) -> Trained:
-    """Train a policy, and judge it over `final_episodes` whole episodes.
+    """Train a policy, and evaluate it over `final_episodes` whole episodes.
 
     The folder gets `RUN`, checkpoints, `EVALUATIONS` and `CURVE` (a JSON document in each line), `BEST` (the
     policy of the best evaluation) and `FINAL`. ``Schedule(target_return=...)`` ends the training at the first
-    evaluation with this mean return. A run that was ended, even by a power failure, goes on with
-    `resume` from its last checkpoint: weights, state of the optimizer, schedules, scaling and replay buffer
-    are those of the checkpoint; the environments begin new episodes. A run of an earlier dynx goes on with
-    the joint dynamics that its environments had (`of_earlier_version`). A finished run is only judged, unless
-    the number of steps is greater now: then it goes on, with schedules that end at the new one.
+    evaluation with this mean return. With `resume` a run that was ended, even by a power failure, continues
+    from its last checkpoint: weights, state of the optimizer, schedules, scaling and replay buffer are those
+    of the checkpoint; the environments begin new episodes. A run of an earlier dynx keeps the joint dynamics
+    that its environments had (`of_earlier_version`). A finished run is only evaluated. If the number of steps
+    is greater now, it continues, with schedules that end at the new number.
 
     Raises ArgumentError for a folder that has another run, or one that is not to be resumed, and the errors
     of the task and the algorithm.

@@ -70,7 +70,7 @@ class TrainingSpec:
 
     @checks_types
     def obstacle_to_continuing(self, other: TrainingSpec) -> str | None:
-        """Return a sentence about why this run cannot go on from what `other` learned; None if it can.
+        """Return a sentence about why this run cannot continue from what `other` learned; None if it can.
 
         It can if nothing but the number of steps differs, and that is not smaller.
         """

@@ -63,11 +63,11 @@ class Picture:
     depth: Floats
     """Distance along the optical axis (height, width) [m]; infinite where nothing is seen."""
     segmentation: NDArray[np.intp]
-    """Number in `names` of the part that is seen (height, width); -1 where nothing is."""
+    """Index in `names` of the part that is seen (height, width); -1 where nothing is seen."""
     names: tuple[str, ...]
     """Links as ``robot/link``, and bodies."""
     notes: tuple[str, ...] = ()
-    """What parts are drawn without, such as an image that is missing, one sentence each."""
+    """Sentences on what cannot be drawn, such as a missing image."""
 
     @checks_types
     def mask(self, name: str) -> NDArray[np.bool_]:

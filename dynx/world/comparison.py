@@ -66,8 +66,8 @@ class WorldComparison:
     duration: float
     runs: tuple[EngineRun, ...]
     separations: tuple[Separation, ...] = field(default=())
-    """Distances between the positions of each body that moves, and of each moving link as ``robot/link``, for
-    each two engines, whose names are the `records`."""
+    """Distances between the positions of each body that moves, and of each moving link as ``robot/link``, one
+    for each pair of engines (`Separation.records`)."""
     contact_interval: float | None = None
     """Interval [s] of `EngineRun.mean_contacts`; None where contacts were not summed."""
 

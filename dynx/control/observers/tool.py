@@ -45,7 +45,7 @@ class SensorMotion:
     """Motion of a force-torque sensor at n instants, in its own axes: what an IMU at its origin reads."""
 
     acceleration: Floats
-    """Proper acceleration (n, 3) of its origin, the acceleration minus gravity [m/s^2]."""
+    """Proper acceleration (n, 3) of the sensor's origin: the acceleration minus gravity [m/s^2]."""
     angular_velocity: Floats
     """Angular velocity (n, 3) [rad/s]."""
     angular_acceleration: Floats

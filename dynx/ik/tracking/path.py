@@ -48,8 +48,8 @@ class TrackStatus(IntEnum):
     LIMITED = 1
     """The target is not reached: a position limit, its margin or a velocity limit holds the robot back."""
     HELD = 2
-    """The target is not reached, and no limit is the cause: it is out of reach, or singular. q has the least
-    error that is continuous with the sample before."""
+    """The target is not reached, and no limit is the cause: it is out of reach, singular or in collision. Of
+    the configurations continuous with the sample before, q has the least error."""
     JUMPED = 3
     """The target is reached, but only by a configuration that is not continuous with the sample before."""
     TIMED_OUT = 4
@@ -78,7 +78,7 @@ class TrackResult:
     dt: float | None
     """Time between two samples [s], if velocity limits were kept."""
     reason: str = ""
-    """Why the first sample that is not OK is so, of one path; empty if all are OK, and for several paths."""
+    """Reason why the first sample that is not OK failed; empty if all are OK, and for several paths."""
     note: str = ""
     """Sentence on a q0 that was moved into the limits, and on what `avoid` leaves out; empty otherwise."""
 

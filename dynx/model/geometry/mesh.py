@@ -35,7 +35,7 @@ class Mesh:
     fault: DescriptionError | None = field(default=None, compare=False, repr=False)
     """The error of a description whose mesh was not found; raised when the mesh is read."""
     part: int | None = None
-    """Number of those triangles of the file that alone are meant, by their look; None for all, of any."""
+    """Number of the part in `parts` of the whole file of which the mesh consists; None for all triangles."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "file", checked_path(self.file))

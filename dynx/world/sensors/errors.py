@@ -60,10 +60,10 @@ class SensorErrors:
     """Density of the rate of the bias [unit/s/sqrt(Hz)]: after t seconds the bias has the standard deviation
     ``random_walk * sqrt(t)``."""
     scale: ArrayLike = 0.0
-    """Relative error of the scale."""
+    """Relative error: a reading also contains this fraction of the true value."""
     cross_axis: ArrayLike = 0.0
-    """Part of each component that the others read: a matrix (m, m) with a diagonal of zeros, or one number
-    for all pairs of components."""
+    """Fractions of the other components that a component also contains: a matrix (m, m) with a diagonal of
+    zeros, or one number for all pairs of components."""
     resolution: ArrayLike = 0.0
     """Step to whose multiples the reading is rounded; 0 for none."""
     saturation: ArrayLike = math.inf

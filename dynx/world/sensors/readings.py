@@ -58,7 +58,7 @@ class Readings:
     channels: Mapping[str, Floats]
     """Values (m, size) of each channel."""
     period: float
-    """Time [s] between two samples; those of steps that are no multiple of it are up to a step late."""
+    """Time [s] between two samples; if it is no multiple of the step, samples are up to a step late."""
 
     def __len__(self) -> int:
         """Return the number of samples."""

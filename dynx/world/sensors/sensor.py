@@ -52,7 +52,7 @@ class Sensor(ABC):
     seed: int = 0
 
     channels: ClassVar[tuple[SensorChannel, ...]]
-    """What it measures, in the order of the values of a reading."""
+    """Measured quantities, in the order of the values of a reading."""
     kind: ClassVar[str]
     """Name of the class in documents."""
     touches: ClassVar[bool] = False
