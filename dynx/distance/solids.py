@@ -19,6 +19,7 @@ class Field:
     """The triangles of a height field, each the top of a prism."""
 
     def __init__(self, shape: HeightField) -> None:
+        self.shape = shape
         vertices, faces = shape.triangles()
         self._tops: Floats = vertices[faces]
         normals = np.cross(self._tops[:, 1] - self._tops[:, 0], self._tops[:, 2] - self._tops[:, 0])
@@ -26,6 +27,11 @@ class Field:
         self._bottom = float(vertices[:, 2].min()) - shape.DEPTH
         self._lower, self._upper = self._tops.min(axis=1), self._tops.max(axis=1)
         self._lower[:, 2] = self._bottom
+
+    @property
+    def box(self) -> tuple[Floats, Floats]:
+        """Lower and upper corner (3,) of the solid in its own frame [m]."""
+        return self._lower.min(axis=0), self._upper.max(axis=0)
 
     def distance(self, T_field: Floats, core: Core, T: Floats, limit: float) -> Distance | None:
         """Return the distance of a shape, first, from the nearest prism; None if it is above `limit`."""
