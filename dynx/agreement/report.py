@@ -291,8 +291,8 @@ def results_document(
 ) -> dict[str, Any]:
     """Return the JSON document of many reports, as `dynx agree --json` writes it.
 
-    `not_done` names the robots of an interrupted run that have no report, `left_out` those in xacro below a
-    directory.
+    `not_done` names the robots of an interrupted run that have no report. `left_out` names the xacro files
+    below a directory, which are not examined.
     """
     results = [report.to_dict() for report in reports]
     refused = sum(result["error"] is not None for result in results)

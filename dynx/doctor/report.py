@@ -493,8 +493,8 @@ class DoctorDocument:
 def results_document(
     reports: Iterable[DoctorReport], not_done: Sequence[str] = (), left_out: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Make the JSON document of reports; `not_done` names the robots that an interrupted run left out,
-    `left_out` those in xacro below a directory."""
+    """Make the JSON document of reports. `not_done` names the robots that an interrupted run left out,
+    `left_out` the xacro files below a directory, which are not examined."""
     reports = list(reports)
     statuses = Counter(report.status for report in reports)
     counts = {word: statuses[word] for word in get_args(Status)}

@@ -43,8 +43,8 @@ class EngineOrder:
     """Order of the q and v of an engine for a robot, and the conversions from and to those of dynx.
 
     The conversions do more than change the order. They fill joints that follow others or are locked, and
-    express the velocity of a floating base in the axes of the engine (see the table of this module). Entries
-    of the engine for which the file has no joint are neutral. Arrays may have leading axes, which broadcast.
+    express the velocity of a floating base in the axes of the engine. Entries of the engine for which the
+    file has no joint are neutral. Arrays may have leading axes, which broadcast.
     """
 
     engine: str

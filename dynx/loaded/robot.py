@@ -112,7 +112,7 @@ class LoadedRobot(ABC):
     """A file as one engine loads it, with results in the coordinates of dynx.
 
     `model` defines the coordinates: its base, its gravity, its links and its moving joints (mimic joints have
-    to be set free in it). It gives names and order only; what the engine loaded is not corrected by it.
+    to be set free in it). It gives only names and order, and does not correct what the engine loaded.
     Coordinates that the engine has and the model lacks are held at zero.
 
     Each method takes one sample: q (nq,), v, a, tau (nv,), float64 and finite. Results are not checked:
@@ -188,7 +188,7 @@ class LoadedRobot(ABC):
 
     @abstractmethod
     def inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Return tau (nv,) as the engine computes it, with joint damping, say, if the engine adds it."""
+        """Return tau (nv,) as the engine computes it, including joint damping if the engine adds it."""
 
     @abstractmethod
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:

@@ -56,7 +56,7 @@ def all_rules() -> tuple[Rule, ...]:
 
 @checks_types
 def find_rule(name: str) -> Rule:
-    """Return the rule of that id or name, in any case.
+    """Return the rule of that id or name, in upper or lower case.
 
     Raises UnknownNameError with the rules that have `name` in id, name or title, or else with the nearest
     names.

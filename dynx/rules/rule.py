@@ -97,7 +97,7 @@ class Remedy:
 
 
 class Rule(ABC):
-    """A cause. The docstring of the class that defines a rule is its page.
+    """A cause of differences. The docstring of the class that defines a rule is the page of the rule.
 
     The page begins with a heading, ``DX101 link-without-inertial: A link without ...``, which gives the `id`,
     the `name` and the `title`. The body describes the cause, its effect in each engine, and the remedy.
@@ -115,7 +115,7 @@ class Rule(ABC):
     other engine, because a user may examine other engines."""
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf",)
-    """Formats of the files in which the rule looks for its cause; the trap is of the first."""
+    """Formats of the files in which the rule looks for its cause; the trap has the first of these formats."""
 
     kind: ClassVar[Kind] = "difference"
     stage: ClassVar[Stage] = "model"
@@ -268,7 +268,7 @@ class Correction:
     """One place where a rule applies, and the edits that correct it; no edits where none does.
 
     `renamed` lists the attributes whose number stood under a misspelled name. Engines then read another
-    number, so that this changes the physics. With `whole` the edits do nothing else.
+    number, so this changes the physics. With `whole` the edits correct only such names.
     """
 
     detection: Detection

@@ -453,14 +453,15 @@ class Viewer(Controls):
 
     @checks_types
     def look_from(self, camera: Camera) -> None:
-        """Give all open pages the view of a camera in the world. Raises ArgumentError for one on a part."""
+        """Give all open pages the view of a camera in the world. Raises ArgumentError for a camera on a
+        part."""
         self.page.check_open()
         for client in self.page.server.get_clients().values():
             look_from(client, _checked_camera(camera))
 
     @checks_types
     def save_view(self, name: str, camera: Camera | None = None) -> None:
-        """Keep a view under a name, by default that of the first open page; the page has a choice of them.
+        """Save a view under a name, by default the view of the first open page; pages offer the saved views.
 
         Raises ArgumentError without a camera where no page is open.
         """
@@ -640,9 +641,9 @@ class Viewer(Controls):
         return found._replace(words=(*found.words, *written))
 
     def set_shown(self, what: str, visible: bool = True) -> None:
-        """Show or hide what the panel calls `what` below "show", such as ``"frames"``, ``"contact forces"``,
-        ``"inertia ellipsoids"`` or ``"collision shapes"``. Raises ArgumentError for what the view does not
-        have."""
+        """Show or hide the item `what` that the panel lists below "show", such as ``"frames"``, ``"contact
+        forces"``, ``"inertia ellipsoids"`` or ``"collision shapes"``. Raises ArgumentError for what the view
+        does not have."""
         self.page.check_open()
         check_switches({"visible": visible})
         switches = self.view.switches

@@ -270,11 +270,11 @@ class World:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Parts that overlap at the start, constraints that it violates, joints beyond their limits, robots
-        whose accelerations have no bound, parts that are too fast for the step, coefficients of contact that
-        the engine does not have, joint dynamics that are not exact, a step that is long, angles of the scene
-        that look like degrees, and settings given that the engine changes, one sentence each; then targets of
-        motors in steps that look like degrees."""
+        """Sentences on parts that overlap at the start, constraints that the start violates, joints beyond
+        their limits, robots whose accelerations have no bound, parts that are too fast for the step,
+        coefficients of contact that the engine does not have, joint dynamics that are not exact, a step that
+        is long, angles of the scene that look like degrees, and given settings that the engine changes.
+        Targets of motors in later steps that look like degrees follow."""
         return tuple(dict.fromkeys((*self._notes, *self._commands.notes())))
 
     @property

@@ -43,9 +43,9 @@ def sarif_document(
     not_done: Sequence[str] = (),
     left_out: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Make the document. Differences in the baseline and findings of ignored rules are marked as suppressed.
-
-    `not_done` names the robots that an interrupted run left out, `left_out` those in xacro below a directory.
+    """Make the SARIF document. Differences in the baseline and findings of ignored rules are marked as
+    suppressed. `not_done` names the robots that an interrupted run left out, `left_out` the xacro files below
+    a directory, which are not examined.
     """
     reports = list(reports)
     notes = [f"{wording.name(robot)} was not examined: the run was interrupted" for robot in not_done]
