@@ -17,15 +17,15 @@ from dynx.errors import nearest, shown
 
 _JOINT_LIMITS = "Model.joint(name), with limits, axis and dynamics"
 _MOTORS = (
-    "World.step(motors={robot: dynx.PDMotor(...)}), or TorqueMotor, PositionMotor, VelocityMotor; "
-    "World.step(torques={robot: tau}); a controller of dynx.control in dynx.simulate, such as "
-    "OpenLoop with a table of torques"
+    "World.step(motors={robot: dynx.PDMotor(...)}), or with TorqueMotor, PositionMotor or VelocityMotor; "
+    "World.step(torques={robot: tau}); in dynx.simulate a controller of dynx.control, such as OpenLoop with "
+    "a table of torques"
 )
 _POSITIONS, _VELOCITIES = "World.state.robots[name].q", "World.state.robots[name].v"
 _STATE = f"{_POSITIONS} and {_VELOCITIES}"
 _POSE_OF_BODY = f"World.state.bodies[name].T_world_body of a body; {_POSITIONS}[:7] of a floating base"
 _SET_STATE = "World.set_state(...), or SceneRobot(q=..., v=...) at the start"
-_SHAPES = "dynx.world.box, sphere, cylinder, capsule or mesh, in Scene(bodies=...)"
+_SHAPES = "dynx.world.box, sphere, cylinder, capsule or mesh, for a body in Scene(bodies=...)"
 _CONSTRAINT = "dynx.world.PointToPoint or Weld, in Scene(constraints=...)"
 _FORCE = "dynx.ExternalForce(part, wrench), in World.step(forces=[...])"
 _CAMERA = "World.camera(dynx.world.Camera(...))"
@@ -34,7 +34,7 @@ _FILES = "dynx.load(path) for a robot in URDF or xacro, and dynx.world.read_scen
 _SAVE = "World.save(), or World.write(path) for a file"
 _CLOSE = "World.close(), or a with block"
 _START = "World(scene, engine='pybullet'), without a window; World.view shows it"
-_SETTINGS = "an option of World(scene, ...), such as dt, substeps or a setting of the engine"
+_SETTINGS = "an argument of World(scene, ...), such as `dt`, `substeps` or a setting of the engine"
 _LOADED = "dynx.load(path)"
 _EULER = "roll, pitch, yaw [rad]"
 _WITH_ARMATURE = "Backend.mass_matrix(q, joint_dynamics=True)"
@@ -51,8 +51,8 @@ PYBULLET = {
     "calculateInverseKinematics2": "Backend.inverse_kinematics({frame: pose, ...})",
     "changeConstraint": "a Scene with the changed constraint, in a new World",
     "changeDynamics": "friction: dynx.world.Material of a body or a link, in the Scene; damping of joints: "
-    "<dynamics> in the URDF for a World, joint_damping in dynx.simulate; masses: mass_scale and payload in "
-    "dynx.simulate; damping of links: link_damping, a setting of World",
+    "<dynamics> in the URDF for a World, `joint_damping` in dynx.simulate; masses: `mass_scale` and "
+    "`payload` in dynx.simulate; damping of links: `link_damping`, a setting of World",
     "computeProjectionMatrixFOV": _CAMERA,
     "computeViewMatrix": _CAMERA,
     "computeViewMatrixFromYawPitchRoll": _CAMERA,
@@ -73,7 +73,7 @@ PYBULLET = {
     "getDynamicsInfo": "Model.link(name), with its inertial",
     "getEulerFromQuaternion": f"dynx.rpy_from_quat(quat_xyzw): {_EULER}",
     "getJointInfo": _JOINT_LIMITS,
-    "getJointState": _STATE,
+    "getJointState": f"{_STATE}; Backend.joint_wrenches(q, v, a) for the reaction force",
     "getJointStateMultiDof": _STATE,
     "getJointStates": _STATE,
     "getLinkState": "Backend.forward_kinematics(q, frame), and Backend.frame_velocity(q, v, frame)",
@@ -86,12 +86,12 @@ PYBULLET = {
     "getPhysicsEngineParameters": "World.options and World.settings",
     "getQuaternionFromEuler": f"dynx.quat_from_rpy(rpy): {_EULER}, result x, y, z, w",
     "getVisualShapeData": "Model.geometry",
-    "invertTransform": "numpy.linalg.inv(T) of a pose (4, 4); the transpose of a rotation (3, 3)",
+    "invertTransform": "numpy.linalg.inv(T) for a pose (4, 4); `R.T` for a rotation (3, 3)",
     "loadMJCF": "dynx.load(path) for a robot, dynx.world.read_scene(path) for a scene; Model.to_mjcf and "
     "World.to_mjcf write MJCF",
     "loadSDF": "dynx.load(path) for a robot",
     "loadURDF": f"{_LOADED}, and dynx.world.SceneRobot(name, model) in a Scene",
-    "multiplyTransforms": "T_AB @ T_BC of poses (4, 4)",
+    "multiplyTransforms": "`T_AB @ T_BC`, with poses (4, 4)",
     "rayTest": "World.cast_rays(origins, directions)",
     "rayTestBatch": "World.cast_rays(origins, directions)",
     "removeBody": "a Scene without the body, in a new World",
@@ -110,7 +110,7 @@ PYBULLET = {
     "file of pybullet_data without `package_dirs`",
     "setCollisionFilterGroupMask": "Scene.ignored, pairs of parts that do not touch",
     "setCollisionFilterPair": "Scene.ignored, pairs of parts that do not touch",
-    "setGravity": "gravity=(0, 0, -9.81) of Scene, or of dynx.load",
+    "setGravity": "`gravity=(0, 0, -9.81)`, an argument of Scene and of dynx.load",
     "setJointMotorControl": _MOTORS,
     "setJointMotorControl2": _MOTORS,
     "setJointMotorControlArray": _MOTORS,
@@ -203,8 +203,8 @@ DRAKE = {
     "CalcBiasSpatialAcceleration": "`Backend.jacobian_derivative(q, v, frame) @ v`",
     "CalcBiasTerm": "Backend.bias_torque(q, v), which also includes gravity",
     "CalcGravityGeneralizedForces": "Backend.gravity_torque(q), with the opposite sign",
-    "CalcInverseDynamics": f"{_TORQUE}, which includes armature, as Drake does, and also gravity, damping, "
-    "dry friction and springs",
+    "CalcInverseDynamics": f"{_TORQUE}; both include armature, and dynx also includes gravity, damping, dry "
+    "friction and springs",
     "CalcKineticEnergy": "Backend.kinetic_energy(q, v, joint_dynamics=True)",
     "CalcMassMatrix": _WITH_ARMATURE,
     "CalcMassMatrixViaInverseDynamics": _WITH_ARMATURE,
@@ -249,7 +249,8 @@ ROBOTICSTOOLBOX = {
     "jacobe": "Backend.jacobian(q, frame, reference='local')",
     "jtraj": "dynx.trajectory.quintic(q0, q1, duration)",
     "mstraj": "dynx.trajectory.spline(...) or dynx.trajectory.time_optimal_path(...)",
-    "mtraj": "dynx.trajectory.quintic(q0, q1, duration) or dynx.trajectory.trapezoidal(q0, q1, duration)",
+    "mtraj": "dynx.trajectory.quintic(q0, q1, duration), or "
+    "dynx.trajectory.trapezoidal(q0, q1, velocity=..., acceleration=...)",
     "qlim": "Model.lower and Model.upper",
     "rne": "Backend.inverse_dynamics(q, v, a)",
     "teach": "Model.view(), a page with a slider for each joint",
