@@ -432,8 +432,8 @@ class Backend(QuantityCalls):
         """Return the wrench (..., 6) [N, N m] that the world exerts on the root link: force, then moment.
 
         With a fixed base it is what the robot's foundation must bear, with a floating base the first six
-        entries of `inverse_dynamics`. The options are those of `joint_wrenches`; by default it is at the
-        origin of the base frame, in its axes. Featherstone 2008, table 5.1.
+        entries of `inverse_dynamics`. The options are those of `joint_wrenches`; by default the wrench is at
+        the origin of the base frame, in its axes. Featherstone 2008, table 5.1.
         """
         wrench = self._evaluate("base_wrench", (q, v, a))[..., None, :]
         found = self._wrenches(wrench, q, range(1), frame, reference, external_forces, force_reference)

@@ -74,7 +74,7 @@ class Derivatives:
     Arrays are float64 with leading batch axes that broadcast, as in `Backend`. The derivative of f(q) is that
     of f(model.integrate(q, d)) with respect to the displacement d (nv,) at d = 0. For a floating base d is a
     translation and a rotation in the axes of the base; for joints these are ordinary partial derivatives. The
-    unit is that of f divided by that of the variable.
+    unit is the unit of f divided by the unit of the variable.
 
     Damping, friction, armature and external forces are not included.
 

@@ -231,8 +231,9 @@ class ModelBased(Controller[ControllerState]):
     def with_joint_dynamics(
         self, tau: Array, q: Array, v: Array, a: Array, v_wanted: Array, h: Array | float = 0.0
     ) -> Array:
-        """Return a torque (nv,) plus that of springs at q, of armature and damping at velocity `v` and
-        acceleration `a`, and of dry friction along `v_wanted`. Damping is that after a step of `h` [s]."""
+        """Return a torque (nv,) plus the torques of springs at q, of armature and damping at velocity `v` and
+        acceleration `a`, and of dry friction along `v_wanted`. The damping torque is the one after a step of
+        `h` [s]."""
         joints = self.joints
         if joints is None:
             return tau

@@ -99,7 +99,7 @@ class DiscreteComputedTorque(ModelBased[None], pure=True):
 
     @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
-        """Return the torque (nv,); the setpoint is that of the end of the step."""
+        """Return the torque (nv,); `setpoint` is the setpoint at the end of the step."""
         _, q, v = measurement
         dt = self.control_dt
         a, tau_of = one_step_acceleration(q, v, setpoint.q, dt), self.dynamics.inverse_dynamics

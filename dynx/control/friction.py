@@ -63,7 +63,7 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
     def torque(
         self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
     ) -> tuple[Floats, ControllerState]:
-        """Return the torque (nv,) of the inner controller plus that of friction."""
+        """Return the torque (nv,) of the inner controller plus the friction torque."""
         tau, state = self.inner.torque(measurement, setpoint, state)
         return tau + self.losses(measurement.v if self.speed == "measured" else setpoint.v), state
 

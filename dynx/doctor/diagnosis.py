@@ -458,21 +458,21 @@ def diagnose(
 ) -> DoctorReport:
     """Find and prove the causes for which engines that load this robot's file differ, and mend the file.
 
-    `robot` is any argument of `dynx.load`. `base` is that of a robot in URDF, ``"fixed"`` by default; MJCF
-    and SDF state it. `engines` are names of `dynx.loaded.ENGINES` and of `dynx.loaded.VARIANTS` (default: all
-    engines that are installed and load files of this format). Each engine loads the file by its documented
-    call. dynx compares it with reference values at `samples` random states that follow from `seed`, in tilted
-    gravity. A relative error above `tolerance` is a difference. By default common variants are examined too
-    (`DoctorReport.variants`); they differ by the user's call, which no file can mend, so they count as
-    differences only if `engines` names them. In the mended file no cause has an effect above `fix_tolerance`,
-    and new numbers have the fewest digits that keep every engine within a tenth of `fix_tolerance`. By
-    default this limit is `tolerance`, and new numbers have all digits. `choose` maps rule ids to one of the
-    rule's `choices`. `level` is the largest change of the mended file: ``safe`` changes nothing that a reader
-    notices, ``rounding`` the equations of motion by rounding only, ``physics`` whatever the causes require.
-    `ignore` has ids or names of rules whose findings make no check fail; with `only`, findings of all other
-    rules make no check fail. They stay in `findings`, are counted in `DoctorReport.ignored`, and are mended.
-    `counterexamples` selects the search for the smallest robot that shows a difference which no rule
-    explains. `progress` is called with the name of each step.
+    `robot` is any argument of `dynx.load`. `base` is the base of a robot in URDF, ``"fixed"`` by default;
+    files in MJCF and SDF state their base. `engines` are names of `dynx.loaded.ENGINES` and of
+    `dynx.loaded.VARIANTS` (default: all engines that are installed and load files of this format). Each
+    engine loads the file by its documented call. dynx compares it with reference values at `samples` random
+    states that follow from `seed`, in tilted gravity. A relative error above `tolerance` is a difference. By
+    default common variants are examined too (`DoctorReport.variants`); they differ by the user's call, which
+    no file can mend, so they count as differences only if `engines` names them. In the mended file no cause
+    has an effect above `fix_tolerance`, and new numbers have the fewest digits that keep every engine within
+    a tenth of `fix_tolerance`. By default this limit is `tolerance`, and new numbers have all digits.
+    `choose` maps rule ids to one of the rule's `choices`. `level` is the largest change of the mended file:
+    ``safe`` changes nothing that a reader notices, ``rounding`` the equations of motion by rounding only,
+    ``physics`` whatever the causes require. `ignore` has ids or names of rules whose findings make no check
+    fail; with `only`, findings of all other rules make no check fail. They stay in `findings`, are counted in
+    `DoctorReport.ignored`, and are mended. `counterexamples` selects the search for the smallest robot that
+    shows a difference which no rule explains. `progress` is called with the name of each step.
 
     A robot that cannot be read gives a report with `error` set, whose `findings` are the places without a
     remedy. Raises ArgumentError, UnknownBackendError, NotInstalledError and UnknownNameError for arguments
@@ -530,7 +530,7 @@ def compare_as_loaded(
 ) -> DoctorReport:
     """Compare engines that load the file themselves, without a search for causes.
 
-    The states are those of `diagnose`. A report of engines that differ is never `explained`.
+    The states are the same as in `diagnose`. If engines differ, `explained` of the report is False.
     """
     started = time.perf_counter()
     examiner, variants = _examiners(engines, samples, seed, tolerance)

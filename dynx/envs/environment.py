@@ -126,8 +126,8 @@ class TaskEnvironment(Env[Any, Any]):
     ) -> tuple[Any, dict[str, Any]]:
         """Start an episode; return its first observation, and info.
 
-        Episodes after a `seed` are the same in each run. `options` are those of the task's start, by name.
-        Raises UnknownNameError for an option that the task does not have.
+        Episodes after a `seed` are the same in each run. `options` are the options of the task's method
+        `start`, by name. Raises UnknownNameError for an option that the task does not have.
         """
         episodes = self.episodes
         super().reset(seed=None if seed is None else checked_seed("seed", seed))
@@ -151,11 +151,12 @@ class TaskEnvironment(Env[Any, Any]):
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Act for one control step; return observation, reward, terminated, truncated and info.
 
-        A step that diverges, or that the engine fails to take, truncates the episode: the observation is that
-        before the step, the reward 0, and ``info["diverged"]`` says why. Raises EpisodeError before the first
-        `reset` and after the end of an episode, and ArgumentError (and its kinds) for an action that is not
-        in the action space; the episode is unchanged then. Raises ShapeError, DTypeError or NotFiniteError
-        for an invalid result of a method of a `RobotTask`; the error names the task and the method.
+        A step that diverges, or that the engine fails to take, truncates the episode: the observation is the
+        one before the step, the reward is 0, and ``info["diverged"]`` states the cause. Raises EpisodeError
+        before the first `reset` and after the end of an episode, and ArgumentError (and its kinds) for an
+        action that is not in the action space; the episode is unchanged then. Raises ShapeError, DTypeError
+        or NotFiniteError for an invalid result of a method of a `RobotTask`; the error names the task and the
+        method.
         """
         episodes = self.episodes
         if self._phase != "running":

@@ -139,7 +139,8 @@ class Task(ABC):
 
     @classmethod
     def with_options(cls: type[Kind], options: Mapping[str, Any]) -> Kind:
-        """Return the task with these options. Raises UnknownNameError for one that it does not have."""
+        """Return the task with these options. Raises UnknownNameError for an option that the task does not
+        have."""
         kind: Any = cls
         known = [each.name for each in fields(kind) if each.init] if is_dataclass(kind) else []
         for name in options:
@@ -311,7 +312,7 @@ class RobotTask(Task):
 
     @cached_property
     def camera(self) -> Camera:
-        """Camera of the pictures; its size is replaced by that of the environment."""
+        """Camera of the pictures; the environment replaces its size."""
         return camera_at((0.0, -3.0, 0.6), (0.0, 0.0, 0.4))
 
     @property
@@ -417,8 +418,8 @@ class WorldTask(Task):
     def scene_of_episode(self, rng: np.random.Generator, memory: SimpleNamespace) -> Scene | None:
         """Return the scene of an episode that differs from the others in more than the state, or None.
 
-        `memory` is that of the episode. A scene is opened in the engine anew, which takes milliseconds;
-        without one the world returns to its start.
+        `memory` is the memory of the episode. dynx opens a returned scene in the engine anew, which takes
+        milliseconds. With None the world returns to its start.
         """
         return None
 
@@ -464,7 +465,7 @@ class WorldTask(Task):
 
     @cached_property
     def camera(self) -> Camera:
-        """Camera of the pictures; its size is replaced by that of the environment."""
+        """Camera of the pictures; the environment replaces its size."""
         return camera_at((1.5, -1.5, 1.0), (0.0, 0.0, 0.2))
 
     @classmethod

@@ -311,8 +311,8 @@ class FrameTarget:
     """Target of one frame among several that are to be reached at once.
 
     `target` is a pose T_world_target (..., 4, 4), a position (..., 3) [m] or a rotation (..., 3, 3), as for
-    one frame. The other fields are those of `dynx.ik.options.Options`; tolerances and axes that are None are
-    those of the call.
+    one frame. The other fields are those of `dynx.ik.options.Options`; tolerances and axes that are None take
+    the values of the call.
     """
 
     frame: str
@@ -326,7 +326,7 @@ class FrameTarget:
 
     @checks_types
     def options(self, of_call: Options) -> Options:
-        """Return the options of the call with those of this frame."""
+        """Return the options of the call, with the options of this frame in their place."""
         own: dict[str, Any] = {"free": self.free, "point": self.point, "weights": self.weights}
         for name in ("position_tolerance", "rotation_tolerance", "axes"):
             value = getattr(self, name)

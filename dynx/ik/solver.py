@@ -66,9 +66,9 @@ def inverse_kinematics(
     """Find a configuration within limits that brings `frame` to `target`.
 
     `target` is a pose T_world_target (..., 4, 4), or a position (..., 3) [m] with free rotation. With
-    ``free="position"`` it is a rotation (..., 3, 3), or that of a pose; with ``free="rotation"`` a position,
-    or that of a pose. Several frames are reached at once with ``target={"left_hand": T_left, ...}``, or with
-    a list of `FrameTarget`, each with options of its own; `frame` is None then.
+    ``free="position"`` it is a rotation (..., 3, 3), with ``free="rotation"`` a position, or a pose whose
+    other part is ignored. Several frames are reached at once with ``target={"left_hand": T_left, ...}``, or
+    with a list of `FrameTarget`, each with options of its own; `frame` is None then.
 
     `dynx.ik.options.Options` describes each option, with its unit. With `free`, `weights` or tolerances along
     axes a target need not be reached in every direction. ``free="rotation_z"`` leaves the rotation about the

@@ -57,8 +57,8 @@ class EngineOrder:
 
     @cached_property
     def positions(self) -> Array:
-        """Index (nq,) in the engine's q of each entry of dynx's q; that of the cosine where the engine has
-        the cosine and sine of an angle."""
+        """Index (nq,) in the engine's q of each entry of dynx's q. If the engine has the cosine and sine of
+        an angle, this is the index of the cosine."""
         base = self.coordinates.base
         own = [self.coordinates.joints_q[k] for k in self._own]
         return np.array([*(() if base is None else base.q), *own], dtype=np.intp)

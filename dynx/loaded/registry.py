@@ -46,7 +46,7 @@ COMMON_VARIANTS = ("pybullet:plain",)
 
 @checks_types
 def engine_of(name: str) -> str:
-    """Return the engine of a loading variant, or the name itself if it is that of an engine."""
+    """Return the engine of a loading variant, or the name itself if it is the name of an engine."""
     return name.partition(":")[0]
 
 

@@ -22,7 +22,7 @@ Bounds = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class LoadedInertial:
-    """The inertia that an engine holds for a link, with that of the links merged into it.
+    """The inertia that an engine holds for a link, including links that are merged into it.
 
     `mass` is in kg, and `center` (3,) [m] is the centre of mass in the link frame. `inertia` (3, 3) [kg m^2]
     is the tensor about the centre of mass, in the axes of the link frame. `merged` names the other links
@@ -74,7 +74,7 @@ class LoadedModel:
 
 @dataclass(frozen=True, eq=False)
 class EngineBase:
-    """The coordinates of a floating base in those of an engine."""
+    """Position of the coordinates of a floating base in the q and v of an engine."""
 
     q: tuple[int, ...]
     """Index of the entries of dynx: position x, y, z, then quaternion x, y, z, w."""

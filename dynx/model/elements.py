@@ -206,7 +206,7 @@ class Limits:
     """Range of a joint position [rad or m], largest speed [rad/s or m/s] and largest effort [N m or N].
 
     `upper` of a ball joint is its largest angle of rotation [rad], whatever the axis, and `lower` is 0; speed
-    and effort are those about each axis of the child.
+    and effort are the limits about each axis of the child.
     """
 
     lower: float = -INFINITY
@@ -360,8 +360,8 @@ class Actuator:
 class NamedConfiguration:
     """A configuration that a robot description names, such as a keyframe of MJCF.
 
-    `positions` are those of joints by their names: one number [rad or m], or the unit quaternion (x, y, z, w)
-    of a ball joint. `base` is the pose of a floating base in the world: position [m] and unit quaternion
+    `positions` are the positions of joints by name: one number [rad or m], or the unit quaternion (x, y, z,
+    w) of a ball joint. `base` is the pose of a floating base in the world: position [m] and unit quaternion
     (x, y, z, w). What is not stated is neutral.
     """
 

@@ -155,7 +155,7 @@ class Model(Tree):
 
     @checks_types
     def with_frame(self, name: str, link: str, placement: Pose | ArrayLike = IDENTITY) -> Model:
-        """Return the same robot with one more named frame, fixed to `link` (a tool tip, say).
+        """Return the same robot with one more named frame, fixed to `link` (such as a tool tip).
 
         `placement` is the pose of the frame in the link: a `Pose`, or a matrix T_link_frame (4, 4).
         """

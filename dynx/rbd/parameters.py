@@ -276,7 +276,7 @@ class Payload:
 
     @property
     def inertial(self) -> Inertial:
-        """Mass, centre of mass and tensor, as those of a link whose frame is `frame`."""
+        """Mass, centre of mass and inertia tensor in the axes of `frame`."""
         x, y, z = checked_vector("center", self.center).tolist()
         tensor = np.zeros((3, 3)) if self.inertia is None else np.asarray(self.inertia, dtype=float)
         (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = tensor.tolist()

@@ -238,7 +238,7 @@ class CallingRule(Rule):
     """The change, as in `Remedy.changed`."""
 
     per_joint: ClassVar[bool] = True
-    """True if each call can also be made on single joints (`dynx.loaded.robot`), those of the detections."""
+    """True if each call can also be made only on the joints of the detections (`dynx.loaded.robot`)."""
 
     def detect(self, case: Case) -> Sequence[Detection]:
         """Return the occurrences in which the calls are not yet made."""
@@ -265,7 +265,7 @@ class CallingRule(Rule):
 
 @dataclass(frozen=True)
 class Correction:
-    """One place where a rule applies, and the edits that correct it; no edits where none does.
+    """One place where a rule applies, and the edits that correct it; empty if no edit corrects it.
 
     `renamed` lists the attributes whose number stood under a misspelled name. Engines then read another
     number, so this changes the physics. With `whole` the edits correct only such names.

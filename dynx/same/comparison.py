@@ -92,13 +92,13 @@ def same_robot(
     tolerance: float = TOLERANCE,
     package_dirs: Iterable[StrPath] = (),
 ) -> SameReport:
-    """Decide whether two descriptions are those of one robot, and list what differs.
+    """Decide whether two descriptions describe the same robot, and list what differs.
 
         report = dynx.same_robot("arm.urdf", "arm.xml")
         assert report.same, report.differences
 
-    `a` and `b` are what `dynx.load` takes: files, text, names, models, in any of its formats. `base` is that
-    of both; by default a URDF file has the base that the other description states, or a fixed one.
+    `a` and `b` are what `dynx.load` takes: files, text, names, models, in any of its formats. `base` is the
+    base of both; by default a URDF file has the base that the other description states, or a fixed one.
 
     dynx merges links across fixed joints. It compares the lines of the joint axes at the zero positions, and
     the base inertial parameters of the bodies (Gautier and Khalil 1990). Frames of links, the signs of axes,

@@ -90,7 +90,7 @@ class _ReportFields:
 
 @dataclass(frozen=True)
 class SameReport(_ReportFields):
-    """Whether two descriptions are those of one robot, and what differs.
+    """Decision whether two descriptions describe the same robot, and what differs.
 
     `first` and `second` are the names that the caller gave, `first_source` and `second_source` the files or
     texts that were read. `differences` are the fewest elements of the second description that make it the

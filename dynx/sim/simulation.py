@@ -88,7 +88,7 @@ class Simulation:
                 simulation.step()
                 print(simulation.state.q)
 
-    The results are those of `dynx.simulate` on the same scenario, bit for bit, however many steps are taken
+    The results equal those of `dynx.simulate` on the same scenario, bit for bit, however many steps are taken
     at a time. All states are recorded (`rollout`). The engine of the plant stays open until `close`, which
     the end of a ``with`` block calls.
     """
@@ -635,14 +635,14 @@ def simulate(given: SimulateArguments) -> Rollout:
     ``plant="pybullet", integrator="rk4"`` is PyBullet's forward dynamics under RK4. Without a controller
     (None) the robot has no motors. A `ScenePlant` is the robot in a scene, with contacts; the rollout then
     has `surroundings`. `reference` is a trajectory, one configuration (nq,) to hold, or None. The initial
-    state is `q0`, `v0`; by default that of the scene, the start of the reference, or the neutral
+    state is `q0`, `v0`; by default the state of the scene, the start of the reference, or the neutral
     configuration.
 
     **Time** [s]. `dt` is the step of the record; the plant takes `substeps` steps in each. The controller
     runs every `control_dt` (by default `dt`), and its torque is held in between. It measures the state as it
     was `delay` earlier, or the initial state if that is before the start; `control_dt` and `delay` are
-    multiples of `dt`. The default `duration` is that of the reference. It is rounded up to a multiple of
-    `dt`. After the end of the reference, the setpoint is its last configuration.
+    multiples of `dt`. The default `duration` is the duration of the reference. It is rounded up to a multiple
+    of `dt`. After the end of the reference, the setpoint is its last configuration.
 
     **Joints**, the same in every plant: `joint_damping`, dry `joint_friction` and `joint_armature`. Each is
     True for the values of the description (the default, as in a world), False for zero, one number, or one
@@ -655,12 +655,13 @@ def simulate(given: SimulateArguments) -> Rollout:
     law. `pushes` are external wrenches.
 
     **Model error.** The plant has a `payload` and masses scaled by `mass_scale` (all links, or some) that the
-    controller does not know; `noise` is added to the measurements. `sensors` and those of a scene are read
-    after the simulation (`Rollout.sensors`); controllers do not use them.
+    controller does not know; `noise` is added to the measurements. dynx computes the readings of `sensors`,
+    and of the sensors of a scene, after the simulation (`Rollout.sensors`); controllers do not use them.
 
     **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record, and the
-    rest is computed. The result equals that of one run, to the last bit. The record's scenario must be equal
-    to this one in every field but `duration`. The controller must have no state but the one that it returns.
+    rest is computed. The result equals the result of one run, to the last bit. The record's scenario must be
+    equal to this one in every field but `duration`. The controller must have no state but the one that it
+    returns.
 
     **Long runs.** `progress` is called regularly with the number of steps taken and the total number. Ctrl-C
     raises RolloutInterrupted, which has the record until then in ``.rollout``, from which you can resume.

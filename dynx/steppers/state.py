@@ -70,9 +70,9 @@ class WorldState:
     robots: Mapping[str, RobotState]
     bodies: Mapping[str, BodyState]
     torques: Mapping[str, Floats] = field(default_factory=PartStates, compare=False)
-    """Torque (nv,) [N m or N] of every robot in the last step of the engine: the torque given plus that of
-    the motors. Zero if no step was taken since the state was set, and NaN for joints whose torque is known to
-    a motor inside the engine alone. No later step depends on it, so that it is neither set nor compared."""
+    """Torque (nv,) [N m or N] of every robot in the last step of the engine: the given torque plus the torque
+    of the motors. Zero if no step was taken since the state was set, and NaN for joints whose torque only a
+    motor inside the engine knows. No later step depends on it, so that it is neither set nor compared."""
 
 
 def has_diverged(position: Floats, velocity: Floats) -> bool:

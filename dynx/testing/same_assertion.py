@@ -13,7 +13,7 @@ from dynx.same.attributes import Kind
 
 @checks_types
 def assert_same_robot(a: Any, b: Any, *, attributes: Collection[str] = (), **options: Any) -> SameReport:
-    """Assert that two descriptions are those of one robot; return the report.
+    """Assert that two descriptions describe the same robot; return the report.
 
         def test_the_mjcf_is_the_urdf():
             assert_same_robot("arm.urdf", "arm.xml", attributes=("lower limit", "upper limit"))

@@ -426,7 +426,8 @@ class Viewer(Controls):
 
     @checks_types
     def set_visible(self, part: str | None, visible: bool = True) -> None:
-        """Show or hide a part, as those of `follow`; None for all. Raises ArgumentError for an unknown part.
+        """Show or hide a part, named as for `follow`; None for all parts. Raises ArgumentError for an unknown
+        part.
 
         Exported pages, pictures and films show what is shown.
         """
@@ -490,7 +491,7 @@ class Viewer(Controls):
     @checks_types
     def camera_pane(self, camera: Camera, name: str = "camera", shows: str = "colours") -> CameraPane:
         """Add a picture of a camera in the scene, which follows what the page shows: its ``"colours"``, its
-        ``"depth"``, or its ``"parts"`` in colours that tell them apart.
+        ``"depth"``, or its ``"parts"``, each in a different colour.
 
         It is drawn as `World.camera` draws it, by this machine, at most 8 times a second; small pictures,
         such as 160 x 120 pixels, come sooner. `remove_all` removes it. Raises ArgumentError for another kind,
@@ -547,7 +548,7 @@ class Viewer(Controls):
         Pictures and films have the given `size`, width and height [pixels], and are seen from a `direction`
         (3,) in the world. With a `camera` they have its view and its size. A film has `fps` pictures a
         second, or 12.5 and at most 500 in all for None. Pictures and films show the marks, lines and text of
-        the page, hide the parts that it hides, and say how large the tiles of the ground are.
+        the page, hide the parts that it hides, and state the size of the tiles of the ground.
 
         Raises ArgumentError for a page or a film of a live world, whose motion is not known in advance, for
         another suffix, for a file that cannot be written, for a page whose size, camera or direction is

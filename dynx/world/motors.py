@@ -123,8 +123,8 @@ class PositionMotor(_Servo):
     """A motor with the torque kp (target - q) + kd (velocity - v) at the end of each step; arguments as
     for `PDMotor`.
 
-    Where the other forces (Coriolis, contacts, limits) hardly change from one step to the next it is stable
-    at any gain: it uses those of the step before. In long steps stiff gains diverge."""
+    Where the other forces (Coriolis, contacts, limits) hardly change from one step to the next the motor is
+    stable at any gain: it uses these forces of the step before. In long steps high gains diverge."""
 
     @checks_types
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:

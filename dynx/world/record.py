@@ -120,8 +120,8 @@ class Record:
     def at(self, channel: str, times: Floats) -> Floats:
         """Return the rows of a channel at some times [s], interpolated between the two rows around each.
 
-        Rows at the times themselves are returned to the last bit; before the first and after the last time
-        they are those of the first and the last.
+        Rows at the times themselves are returned to the last bit; before the first time they equal the first
+        row, after the last time the last row.
         """
         if channel not in self.channels:
             raise UnknownNameError(f"no channel {shown(channel)}{nearest(channel, self.channels)}")

@@ -43,7 +43,7 @@ class Snapshot:
     """State of a world or of a simulation at one time: everything that determines its later steps."""
 
     engine: str
-    """Name of the engine; of a simulation, that of its plant."""
+    """Name of the engine; for a simulation, the name of its plant."""
     version: str
     """Version of the engine; empty for a simulation without a world."""
     identity: str

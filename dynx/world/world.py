@@ -400,8 +400,8 @@ class World:
         return self._wrenches("base_wrench", robot, frame, reference)
 
     def torque(self, robot: str | None = None) -> Floats:
-        """Return the torque (nv,) [N m or N] given for a robot plus that of its motors in the last step of
-        the engine (`WorldState.torques`), with the errors of `joint_wrenches`."""
+        """Return the sum (nv,) [N m or N] of the torque given for a robot and the torque of its motors in the
+        last step of the engine (`WorldState.torques`), with the errors of `joint_wrenches`."""
         step = self._kept_step()
         step.require()
         return self.state.torques[self._layout.robots[step.number(robot)].name]
@@ -431,8 +431,8 @@ class World:
 
     @property
     def rollout(self) -> int:
-        """Number of the rollout, 0 at first, on which the random numbers of the sensors depend, as those of a
-        simulation on `Noise.rollout`. Set it where a world takes several runs, whose noise is to differ."""
+        """Number of the rollout, 0 at first. The random numbers of the sensors depend on it, like those of a
+        simulation on `Noise.rollout`. Set it if the runs of a world shall have different noise."""
         return self._rollout
 
     @rollout.setter
@@ -491,7 +491,8 @@ class World:
             world.set_state(bodies={"box": (dynx.Pose((0.4, 0.0, 0.3)), None)})  # at rest
 
         None for v or the twist means at rest. The pose is T_world_body (4, 4) or a `Pose`, the twist (6,) in
-        the axes of the world. The time is that of `state`. Everything is checked before anything is set.
+        the axes of the world. With `state` the time of the world becomes `state.time`; otherwise it does not
+        change. dynx checks all arguments first.
         """
         _ = self._motion.engine
         if state is None and robots is None and bodies is None:

@@ -196,7 +196,7 @@ class MomentumObserver(ModelEvaluation):
 
         It is the smallest w that minimises |J' w - residual|, where J is the Jacobian of the frame in this
         `reference`, at this `point` of the frame. For several frames, w has all their wrenches. With
-        `force_only` the moment at the point is zero, as that of a contact is. Directions whose singular
+        `force_only` the moment at the point is zero, as at the point of a contact. Directions whose singular
         values are below `tolerance` times the largest count as not observable: there w is zero (see
         `WrenchEstimate`).
         """

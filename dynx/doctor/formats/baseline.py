@@ -22,8 +22,8 @@ UNEXPLAINED = "unexplained"
 
 
 class Baseline(KnownDifferences):
-    """The known differences between engines. Robots given as paths are relative to `folder`, where their file
-    is, so that a checkout elsewhere has the same baseline."""
+    """The known differences between engines. Paths of robots are relative to `folder`, the folder of the
+    baseline file, so that a checkout elsewhere has the same baseline."""
 
     def compare(self, report: DoctorReport) -> BaselineComparison:
         """Compare a report. The difference of an engine that did not take part does not count as vanished."""

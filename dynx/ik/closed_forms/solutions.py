@@ -97,7 +97,7 @@ class IKSolutions(IKResult):
     """
 
     by_frame: Mapping[str, tuple[Floats, Floats]] = MappingProxyType({})
-    """Empty: the solutions are those of one frame."""
+    """Empty, because the solutions are for one frame."""
     _errors: Floats
     _named: tuple[tuple[str, ...], int | None]
     _full_turns: FullTurns | None

@@ -53,8 +53,8 @@ class TrackStatus(IntEnum):
     JUMPED = 3
     """The target is reached, but only by a configuration that is not continuous with the sample before."""
     TIMED_OUT = 4
-    """`timeout` ended the search before the target was reached: q is the best found so far, or that of the
-    sample before, with NaN as errors, where the search did not begin."""
+    """`timeout` ended the search before the target was reached: q is the best found so far. If the search did
+    not begin, q is that of the sample before, with NaN as errors."""
 
 
 @dataclass(frozen=True, eq=False)

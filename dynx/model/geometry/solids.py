@@ -42,7 +42,7 @@ class SolidProperties:
 
 
 def solid_properties(shape: Shape) -> SolidProperties:
-    """Return volume, centre and second moments of a shape; those of a mesh are the ones of its convex hull.
+    """Return volume, centre and second moments of a shape, or of the convex hull of a mesh.
 
     Raises ArgumentError for a plane or height field, and the errors of `Mesh.hull`.
     """

@@ -18,7 +18,8 @@ from dynx.same.report import SameReport
 
 
 class SameBaseline(KnownDifferences):
-    """The known differences of pairs. Files are relative to `folder`, where that of the baseline is."""
+    """The known differences of pairs. Paths of files are relative to `folder`, the folder of the baseline
+    file."""
 
     def compare(self, report: SameReport) -> BaselineComparison:
         """Compare a report; differences that do not change the verdict do not count."""

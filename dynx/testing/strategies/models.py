@@ -26,8 +26,8 @@ KINDS: tuple[Kind, ...] = ("solid", "physical", "any")
 
 
 def inertials(kind: Kind = "physical") -> Strategy[Inertial | None]:
-    """Draw the ``<inertial>`` of a link, or None. Shrinks to None where that may occur, else to a cube of 1
-    kg at the link's origin.
+    """Draw the ``<inertial>`` of a link, or None. Shrinks to None if the kind allows None, otherwise to a
+    cube of 1 kg at the link's origin.
 
     - ``"solid"``: positive mass and extent along every axis, so that any motion has inertia
     - ``"physical"``: also plates, rods, point masses, an explicit zero, and no inertial at all

@@ -241,7 +241,7 @@ def _checked_inertia(what: str, inertia: ArrayLike) -> Tensor:
 
 @checks_types
 def body_to_urdf(body: SceneBody) -> str:
-    """Return a body of a scene as URDF text of one link, whose frame is that of the body.
+    """Return a body of a scene as URDF text of one link; the frame of the link is the frame of the body.
 
     `dynx.load(text, base="floating")` of it has the same inertia and shapes, in the colour of the body. URDF
     has neither the pose, the twist nor the coefficients of contact. Raises DescriptionError for a height
@@ -263,7 +263,7 @@ def body_to_urdf(body: SceneBody) -> str:
 class Weld:
     """A rigid connection of `a` and `b`: each a body, ``robot/link`` or ``world``.
 
-    `T_a_b` is the pose of the frame of b in that of a; None keeps their relative pose at the start.
+    `T_a_b` is the pose of frame b in frame a; None keeps their relative pose at the start.
     """
 
     a: str

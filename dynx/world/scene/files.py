@@ -66,9 +66,9 @@ def read_scene(
     "Robots in MJCF" lists how dynx reads its elements, and `notes` of the scene name elements that dynx does
     not read.
 
-    Raises RobotNotFoundError where nothing is there, ArgumentError and its kinds for a file that is no scene,
-    with the place in it, and the errors of `dynx.load` for its robots. UnknownNameError for a keyframe that
-    the file has not.
+    Raises RobotNotFoundError if there is no such file, ArgumentError and its subclasses for a file that is no
+    scene, with the place in it, and the errors of `dynx.load` for its robots. UnknownNameError for a keyframe
+    that the file has not.
     """
     path = Path(checked_path(source))
     suffix = path.suffix.lower()

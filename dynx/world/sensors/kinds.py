@@ -115,10 +115,10 @@ class ForceTorqueSensor(PlacedSensor):
 class Imu(PlacedSensor):
     """An inertial measurement unit: specific force ``acceleration`` [m/s^2] and ``angular_velocity`` [rad/s].
 
-    Both are those of the sensor's frame, at `pose` in a frame of a robot or in that of a body, in its axes.
-    The specific force is the acceleration of the frame's origin minus gravity. At rest it is 9.81 m/s^2
-    upwards, in free fall 0 (Groves, Principles of GNSS, inertial and multisensor integrated navigation
-    systems, 2013, eq. 2.76).
+    Both are of the sensor's frame, in its axes. `pose` is the pose of this frame in a frame of a robot or in
+    the frame of a body. The specific force is the acceleration of the frame's origin minus gravity. At rest
+    it is 9.81 m/s^2 upwards, in free fall 0 (Groves, Principles of GNSS, inertial and multisensor integrated
+    navigation systems, 2013, eq. 2.76).
     """
 
     accelerometer: SensorErrors = NO_ERRORS

@@ -103,7 +103,7 @@ class Sensor(ABC):
     def period(self, h: float) -> float:
         """Return the time [s] between two samples in steps of `h` [s].
 
-        Raises ArgumentError for a rate above that of the steps.
+        Raises ArgumentError if the sensor has a higher rate than the steps.
         """
         if self.rate is None:
             return h
