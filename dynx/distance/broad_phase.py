@@ -56,7 +56,7 @@ class SolidBounds:
         found = pairs_within(boxes, margin, allowed)
         if not self._planes:
             return found
-        keep = ~np.isin(found, self._planes).all(axis=1)
+        keep: NDArray[np.bool_] = np.asarray(~np.isin(found, self._planes).all(axis=1))
         for plane in self._planes:
             rows = np.flatnonzero(keep & (found == plane).any(axis=1))
             others = found[rows].sum(axis=1) - plane

@@ -6,18 +6,22 @@ import math
 from typing import NamedTuple
 
 from dynx.distance.box_separation import box_separation
-from dynx.distance.contact_reduction import TIE, ContactCandidate, reduced
+from dynx.distance.contact_reduction import TIE, ContactCandidate, largest, reduced
 from dynx.distance.cores import BoxCore, CylinderCore, EllipsoidCore, HullCore, PointCore, SegmentCore
 from dynx.distance.distance import distance_of_cores
-from dynx.distance.overlap_polygon import INSIDE, overlap
+from dynx.distance.field_contacts import field_candidates
+from dynx.distance.overlap_polygon import INSIDE, NEAREST, overlap
 from dynx.distance.placed_solids import PlacedSolid, placed_cores
 from dynx.distance.plane_contacts import plane_candidates
 from dynx.distance.support_features import ContactFrame, SupportFeature, frame_along, support_feature
 from dynx.errors import ArgumentError
 from dynx.spatial.plain import Vector3, dot
 
-NEAREST = -2
-"""Number of the nearest point of a shape, which belongs to none of its features."""
+SAME_NORMAL = 1.0 - 1e-6
+"""Cosine of the angle between two normals from which a ground counts as one plane."""
+
+VALLEY = 2**70
+"""Difference of the numbers of contact points of one vertex with two slopes."""
 
 MARGIN = 1e-7
 """Distance outside of a feature, relative to the size of the shapes, that counts as inside."""
@@ -87,7 +91,7 @@ def _in_order(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tupl
         raise ArgumentError("both shapes are grounds; grounds have no contact points with each other")
     if core_b is None:
         if b.solid.field is not None:
-            return ()
+            return _of_field(a, b, within, limit)
         normal, found, size = plane_candidates(a, b, within)
         return _contacts(reduced(found, limit, size), normal)
     if isinstance(core_a, PointCore) and isinstance(core_b, PointCore):
@@ -170,6 +174,35 @@ def _of_capsules(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> t
         ContactPoint(c.point_a, c.point_b, normals[c.feature], c.gap, c.feature)
         for c in reduced(found, min(limit, 2), size)
     )
+
+
+def _of_field(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tuple[ContactPoint, ...]:
+    """Return the contact points of a bounded shape with a height field, each with the normal of its place."""
+    core = a.solid.core
+    assert core is not None
+    size = core.extent + core.radius
+    groups: list[tuple[Vector3, list[ContactCandidate]]] = []
+    for normal, candidate in field_candidates(a, b, within):
+        for other, group in groups:
+            if dot(normal, other) > SAME_NORMAL:
+                group.append(candidate)
+                break
+        else:
+            groups.append((normal, [candidate]))
+    found = [(normal, each) for normal, group in groups for each in reduced(group, limit, size)]
+    if len(found) > limit:
+        kept = {id(each) for each in largest([each for _, each in found], limit, size)}
+        found = [pair for pair in found if id(pair[1]) in kept]
+    # A vertex in a valley touches both slopes: its second contact point is numbered apart.
+    points: list[ContactPoint] = []
+    known: set[tuple[int, int]] = set()
+    for normal, each in found:
+        part_a, part_b = each.feature
+        while (part_a, part_b) in known:
+            part_b -= VALLEY
+        known.add((part_a, part_b))
+        points.append(ContactPoint(each.point_a, each.point_b, normal, each.gap, (part_a, part_b)))
+    return tuple(points)
 
 
 def _of_boxes(

@@ -34,10 +34,12 @@ class ContactCandidate(NamedTuple):
 
 
 def reduced(candidates: list[ContactCandidate], limit: int, size: float) -> list[ContactCandidate]:
+    """Return at most `limit` candidates at different places, as `largest` chooses them."""
+    return largest(_distinct(candidates, size), limit, size) if len(candidates) > 1 else candidates
+
+
+def largest(candidates: list[ContactCandidate], limit: int, size: float) -> list[ContactCandidate]:
     """Return at most `limit` candidates, of the largest area and with the deepest one, in their order."""
-    if len(candidates) < 2:
-        return candidates
-    candidates = _distinct(candidates, size)
     count = len(candidates)
     if count <= limit:
         return candidates

@@ -15,6 +15,9 @@ from dynx.distance.support_features import PointOfFeature, SupportFeature
 INSIDE = -1
 """Number of a feature's interior, below which a vertex of the other one lies."""
 
+NEAREST = -2
+"""Number of the nearest point of a shape, where it belongs to none of its features."""
+
 EDGE_BASE = 2**32
 """Base in which two numbers of vertices are one number of the edge between them."""
 

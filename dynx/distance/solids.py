@@ -11,6 +11,7 @@ import numpy as np
 
 from dynx.distance.cores import Core, Hull, HullCore, core_of
 from dynx.distance.distance import Distance, distance_of_cores
+from dynx.distance.terrain import Terrain
 from dynx.model.geometry import HeightField, Mesh, Plane, Shape
 from dynx.spatial.scalar import Floats
 
@@ -19,7 +20,7 @@ class Field:
     """The triangles of a height field, each the top of a prism."""
 
     def __init__(self, shape: HeightField) -> None:
-        self.shape = shape
+        self.terrain = Terrain(shape)
         vertices, faces = shape.triangles()
         self._tops: Floats = vertices[faces]
         normals = np.cross(self._tops[:, 1] - self._tops[:, 0], self._tops[:, 2] - self._tops[:, 0])
@@ -61,6 +62,8 @@ class Field:
         bounds = np.maximum(lowest - self._upper, self._lower - highest).max(axis=1)
         # The planes of the triangles are closer, and worth their time where the boxes overlap.
         near = np.flatnonzero(bounds <= 0.0)
+        if not len(near):
+            return np.asarray(bounds)
         normals = self._normals[near]
         deepest = core.supports(-normals) - core.radius * normals + p
         heights = np.einsum("ij,ij->i", normals, deepest - self._tops[near, 0])
