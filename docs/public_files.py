@@ -62,7 +62,7 @@ three parts, which are not the parts A, B and C:
 A *mended* file is a file that `dynx doctor` repaired. The *reading* of a file consists of names,
 parents, types, axes, origins, limits, masses, centres of mass, and inertia tensors in link axes. An
 independent parser, which shares no code with dynx, reads these data
-(`benchmarks/surveys/same_robot.py`). The rows of the two tables below mean:
+(`benchmarks/surveys/same_robot.py`). The rows of the three tables below mean:
 
 | row | meaning |
 |---|---|
@@ -73,7 +73,7 @@ independent parser, which shares no code with dynx, reads these data
 | changed robot, reported | mended files with a changed reading that the report mentions |
 | alike | mended files on which all engines agree within the bound, in processes without dynx |
 | printed calls | calls of engines, printed by dynx, that run in a process without dynx |
-| size of the changes | changed files, median of changed lines, median of digits in new numbers |
+| size of the changes | three numbers: changed files, median of changed lines, median of digits in new numbers |
 
 On 28 November:
 
