@@ -73,7 +73,7 @@ independent parser, which shares no code with dynx, reads these data
 | changed robot, reported | mended files with a changed reading that the report mentions |
 | alike | mended files on which all engines agree within the bound, in processes without dynx |
 | printed calls | calls of engines, printed by dynx, that run in a process without dynx |
-| size of the changes | three numbers: changed files, median of changed lines, median of digits in new numbers |
+| size of the changes | number of changed files, median of changed lines, median of digits in new numbers |
 
 On 28 November:
 

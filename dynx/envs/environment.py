@@ -153,10 +153,10 @@ class TaskEnvironment(Env[Any, Any]):
 
         A step that diverges, or that the engine fails to take, truncates the episode: the observation is the
         one before the step, the reward is 0, and ``info["diverged"]`` states the cause. Raises EpisodeError
-        before the first `reset` and after the end of an episode, and ArgumentError (and its kinds) for an
-        action that is not in the action space; the episode is unchanged then. Raises ShapeError, DTypeError
-        or NotFiniteError for an invalid result of a method of a `RobotTask`; the error names the task and the
-        method.
+        before the first `reset` and after the end of an episode, and ArgumentError (and its subclasses) for
+        an action that is not in the action space. The episode is unchanged then. Raises ShapeError,
+        DTypeError or NotFiniteError for an invalid result of a method of a `RobotTask`; the error names the
+        task and the method.
         """
         episodes = self.episodes
         if self._phase != "running":

@@ -118,7 +118,7 @@ class Randomization:
     a number for each part that it names.
 
     The robot that moves has the drawn parameters; the task computes with the nominal ones (a torque of
-    gravity, for example), as a controller does. Raises ArgumentError (and its kinds) for numbers that no
+    gravity, for example), as a controller does. Raises ArgumentError (and its subclasses) for numbers that no
     robot has.
     """
 

@@ -211,8 +211,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         truncations and infos, arrays with one row for each.
 
         Raises EpisodeError before the first `reset`, and in mode DISABLED after the end of an episode;
-        ArgumentError and its kinds for an invalid action, NotFiniteError for a torque, reward or observation
-        of the task that is not finite. All leave every environment as it was.
+        ArgumentError and its subclasses for an invalid action, NotFiniteError for a torque, reward or
+        observation of the task that is not finite. After such an error every environment is unchanged.
         """
         if not self._running:
             self._refuse_closed()

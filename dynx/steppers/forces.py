@@ -35,8 +35,8 @@ class EngineCommand(ABC):
     def checked(self: Self, model: Model) -> Self:
         """Return the command with one number per joint in each of its lists.
 
-        Raises ArgumentError (and its kinds) for invalid numbers, UnsupportedFeatureError for a robot without
-        such motors.
+        Raises ArgumentError and its subclasses for invalid numbers, UnsupportedFeatureError for a robot
+        without such motors.
         """
 
 

@@ -58,7 +58,7 @@ def checked_material(name: str, material: object) -> Material:
 
 @checks_types
 def contact_material(a: Material, b: Material) -> Material:
-    """Return the coefficients of the contact of two surfaces: the geometric means of theirs."""
+    """Return the coefficients of the contact of two surfaces: the geometric means of their coefficients."""
     means = [math.sqrt(getattr(a, name) * getattr(b, name)) for name in COEFFICIENTS]
     return Material(means[0], means[1], means[2], means[3])
 

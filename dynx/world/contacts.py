@@ -50,7 +50,7 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class MeanContact:
-    """Mean over an interval of what two bodies exert on one another where they touch.
+    """Mean contact force and moment between two bodies over an interval.
 
     Force and moment times the length of the interval are the impulses of the contacts.
     """

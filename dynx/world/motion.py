@@ -35,7 +35,7 @@ Parts = Mapping[str, tuple[ArrayLike, ArrayLike | None]]
 def checked_state(layout: Layout, state: WorldState | None, robots: Parts, bodies: Parts) -> WorldState:
     """Return the robots and bodies of `state`, then those given by name, all checked.
 
-    Raises ArgumentError and its kinds, naming the robot or body.
+    Raises ArgumentError and its subclasses, naming the robot or body.
     """
     time = 0.0
     if state is not None:

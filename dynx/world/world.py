@@ -303,9 +303,9 @@ class World:
         whose law is evaluated in every step of the engine. The motors of the scene act on robots that neither
         `torques` nor `motors` names. A force acts from its start, a time of this world, for its duration.
 
-        Raises ArgumentError (and its kinds) for arguments, DivergedError where the state stops being finite,
-        with the likely cause. After that, and after Ctrl-C in a step, the world is at the last state that was
-        read, or at a later one at most 1,000 steps old.
+        Raises ArgumentError and its subclasses for arguments, DivergedError with the likely cause if the
+        state stops being finite. After that, and after Ctrl-C in a step, the world is at the last state that
+        was read, or at a later one at most 1,000 steps old.
         """
         if wrong:  # checked here, because a decorator would take 4 % of a step of one body
             refuse_options("step", wrong, World.step, {"wrenches": "forces"})

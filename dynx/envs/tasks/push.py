@@ -220,7 +220,7 @@ class Push(WorldTask):
 
 
 def checked_place(name: str, place: ArrayLike) -> Floats:
-    """Return a place (2,) on the table; ArgumentError (and its kinds) for one beyond the workspace."""
+    """Return a place (2,) on the table; ArgumentError (and its subclasses) for one beyond the workspace."""
     xy = checked_array(name, place, 2)
     low, high = (np.array(corner[:2]) for corner in WORKSPACE)
     if xy.ndim != 1 or (xy < low).any() or (xy > high).any():

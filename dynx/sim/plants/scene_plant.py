@@ -26,7 +26,7 @@ class ScenePlant:
     robot. `engine` and `settings` are those of `dynx.world.World`. Joints stop by the engine's own law,
     unless the simulation has ``joint_limits=False``.
 
-    Raises ArgumentError and its kinds for a robot, an engine or a setting that does not exist.
+    Raises ArgumentError and its subclasses for a robot, an engine or a setting that does not exist.
     """
 
     scene: Scene

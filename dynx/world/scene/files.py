@@ -56,11 +56,11 @@ def read_scene(
 ) -> Scene:
     """Read a scene from a ``.toml`` or ``.json`` file, one of the scenes of dynx by its name, or MJCF.
 
-    The page "Scenes and worlds" of the documentation describes the keys. dynx reads the robots and meshes
-    that a file names only from its folder (its repository or package, if it lies in one), from the libraries
-    of robots, and from `package_dirs`. A robot in a ``.xacro`` file is expanded, which evaluates expressions
-    of that file as Python code: read only scenes with such files that you trust. Other files may come from
-    anyone.
+    The reference page "Files of scenes, exports, shapes and meshes" describes the keys. dynx reads the robots
+    and meshes that a file names only from its folder (its repository or package, if it lies in one), from the
+    libraries of robots, and from `package_dirs`. A robot in a ``.xacro`` file is expanded, which evaluates
+    expressions of that file as Python code: read only scenes with such files that you trust. Other files may
+    come from anyone.
 
     A file in MJCF (``.xml``, ``.mjcf``) starts at its `qpos0`, or at the `keyframe` of that name. The page
     "Robots in MJCF" lists how dynx reads its elements, and `notes` of the scene name elements that dynx does
@@ -68,7 +68,7 @@ def read_scene(
 
     Raises RobotNotFoundError if there is no such file, ArgumentError and its subclasses for a file that is no
     scene, with the place in it, and the errors of `dynx.load` for its robots. UnknownNameError for a keyframe
-    that the file has not.
+    that the file does not have.
     """
     path = Path(checked_path(source))
     suffix = path.suffix.lower()

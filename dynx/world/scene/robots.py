@@ -92,10 +92,10 @@ class SceneRobot:
     """A robot: its `model`, and its configuration `q` (nq,) and velocity `v` (nv,) at the start.
 
     None means the neutral configuration for `q` and zero for `v`; after construction both are tuples. A fixed
-    base is at `model.base_pose`, a floating one where `q` places it; `at` places either. `materials` are the
-    materials of single links, by name; all other links have `material`. Links of one robot collide with one
-    another only with `self_collision`, and never where a joint connects them. `motors` act in each step of a
-    world, unless the step is given other motors for this robot.
+    base is at `model.base_pose`, a floating one where `q` places it; the method `at` changes either.
+    `materials` are the materials of single links, by name; all other links have `material`. Links of one
+    robot collide with one another only with `self_collision`, and never where a joint connects them. `motors`
+    act in each step of a world, unless the step is given other motors for this robot.
 
     Raises ArgumentError for a name, model, material, motor or flag of a wrong kind and for two motors on one
     joint; ShapeError, DTypeError or NotFiniteError for `q` and `v`, ArgumentError for a quaternion not of

@@ -45,8 +45,8 @@ class SensorErrors:
     is the usual model of a gyroscope (IEEE Std 952, annex C; Woodman, An introduction to inertial navigation,
     2007, section 3).
 
-    Raises ArgumentError and its kinds for numbers that are not finite, negative deviations, a resolution or a
-    saturation below 0, and for both kinds of white noise at once.
+    Raises ArgumentError and its subclasses for numbers that are not finite, negative deviations, a resolution
+    or a saturation below 0, and for both kinds of white noise at once.
     """
 
     noise: ArrayLike = 0.0
