@@ -15,7 +15,6 @@ from typing import Any
 from dynx.backends.base import Backend
 from dynx.backends.hooks import untranslated
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import JointCoefficients
 from dynx.spatial.scalar import Floats
 
@@ -56,7 +55,6 @@ class Dynamics(ABC):
     are those of rigid bodies all the same."""
 
     def __init__(self, model: Model) -> None:
-        refuse_ball_joints(model, "a controller or simulation")
         self.model = model
         for quantity in QUANTITIES + FRAME_QUANTITIES:
             setattr(self, quantity, self.evaluation(quantity))

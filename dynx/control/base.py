@@ -20,7 +20,6 @@ from dynx.backends.dynamics import Dynamics, EngineDynamics
 from dynx.control.content import attributes_of, content_of, fields_of
 from dynx.errors import ArgumentError, DTypeError, ShapeError, UnsupportedFeatureError, shown
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import JointCoefficients
 from dynx.rbd.parameters import Parameters
 from dynx.registry import DEFAULT_ENGINE
@@ -155,8 +154,6 @@ class Controller(ABC, Generic[ControllerState]):
         """Set attributes in the constructor of a frozen dataclass, arrays as read-only copies: what a record
         says of a controller must not change."""
         for name, value in values.items():
-            if isinstance(value, Model):
-                refuse_ball_joints(value, "a controller")
             if isinstance(value, np.ndarray):
                 value = value.copy()
                 value.setflags(write=False)

@@ -3,12 +3,14 @@ in discrete time the inverse of its integration step."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.backends import Backend
+from dynx.control.ball_setpoints import in_present_axes, position_error
 from dynx.control.base import Measurement, ModelBased, gain, parameter
 from dynx.control.gains import feedback_gains
 from dynx.model import Model
@@ -54,15 +56,24 @@ class ComputedTorque(ModelBased[None], pure=True):
     @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         _, q, v = measurement
-        a = commanded_acceleration(q, v, *setpoint, self.kp, self.kd)
+        a = commanded_acceleration(q, v, *setpoint, self.kp, self.kd, self.model.ball_places)
         return self.with_joint_dynamics(self.dynamics.inverse_dynamics(q, v, a), q, v, a, setpoint.v), None
 
 
 def commanded_acceleration(
-    q: Array, v: Array, q_wanted: Array, v_wanted: Array, a_wanted: Array, kp: Array, kd: Array
+    q: Array,
+    v: Array,
+    q_wanted: Array,
+    v_wanted: Array,
+    a_wanted: Array,
+    kp: Array,
+    kd: Array,
+    balls: Sequence[int] = (),
 ) -> Array:
-    """Return a* + kd (v* - v) + kp (q* - q), for arrays of any scalar."""
-    a: Array = a_wanted + kd * (v_wanted - v) + kp * (q_wanted - q)
+    """Return a* + kd (v* - v) + kp (q* - q), for arrays of any scalar; `dynx.control.ball_setpoints` has the
+    errors of ball joints, whose quaternions begin at `balls`."""
+    v_wanted, a_wanted = in_present_axes(q, v, q_wanted, v_wanted, a_wanted, balls)
+    a: Array = a_wanted + kd * (v_wanted - v) + kp * position_error(q, q_wanted, balls)
     return a
 
 
@@ -102,11 +113,16 @@ class DiscreteComputedTorque(ModelBased[None], pure=True):
         """Return the torque (nv,); `setpoint` is the setpoint at the end of the step."""
         _, q, v = measurement
         dt = self.control_dt
-        a, tau_of = one_step_acceleration(q, v, setpoint.q, dt), self.dynamics.inverse_dynamics
-        return self.with_joint_dynamics(tau_of(q, v, a), q, v, a, (setpoint.q - q) / dt, dt), None
+        balls, tau_of = self.model.ball_places, self.dynamics.inverse_dynamics
+        a = one_step_acceleration(q, v, setpoint.q, dt, balls)
+        v_next = position_error(q, setpoint.q, balls) / dt
+        return self.with_joint_dynamics(tau_of(q, v, a), q, v, a, v_next, dt), None
 
 
-def one_step_acceleration(q: Array, v: Array, q_next: Array, dt: Array | float) -> Array:
-    """Solve q + dt (v + dt a) = q_next for a, for arrays of any scalar type."""
-    a: Array = ((q_next - q) / dt - v) / dt
+def one_step_acceleration(
+    q: Array, v: Array, q_next: Array, dt: Array | float, balls: Sequence[int] = ()
+) -> Array:
+    """Solve q + dt (v + dt a) = q_next for a, for arrays of any scalar type; a ball joint, whose quaternion
+    begins at one of `balls`, turns by the rotation vector dt (v + dt a)."""
+    a: Array = (position_error(q, q_next, balls) / dt - v) / dt
     return a

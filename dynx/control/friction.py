@@ -78,4 +78,4 @@ def kept_coefficients(model: Model, name: str, given: Coefficients) -> bool | Fl
     each joint. Raises GainError and UnknownNameError for invalid ones."""
     if isinstance(given, bool):
         return given
-    return checked_gain(name, coefficients_by_joint(model, name, given), len(model.joint_names))
+    return checked_gain(name, coefficients_by_joint(model, name, given), len(model.coordinate_names))

@@ -5,10 +5,13 @@ PID                   with anti-windup
 velocity              tau = kd (v* - v), which lets positions drift
 gravity compensation  tau = g(q) + kp (q* - q) + kd (v* - v)
 feed-forward          tau = ID(q*, v*, a*)
+
+`dynx.control.ball_setpoints` has the differences q* - q and v* - v of ball joints.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.backends import Backend
+from dynx.control.ball_setpoints import in_present_axes, position_error
 from dynx.control.base import (
     Controller,
     ControllerState,
@@ -29,7 +33,6 @@ from dynx.control.base import (
 )
 from dynx.control.saturation import checked_limit
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.numbers import checked_gain, positive_seconds
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats, clamp
@@ -43,13 +46,15 @@ class JointSpace(Controller[ControllerState]):
 
     model: Model
 
-    def __post_init__(self) -> None:
-        refuse_ball_joints(self.model, "a controller")
-
     @property
     def n_joints(self) -> int:
-        """Number of joints with a coordinate."""
-        return len(self.model.joint_names)
+        """Number of coordinates of the joints, in v: three of a ball joint."""
+        return len(self.model.coordinate_names)
+
+    @cached_property
+    def balls(self) -> tuple[int, ...]:
+        """Indices in the positions of the joints at which the quaternions of ball joints begin."""
+        return tuple(place - 7 * self.model.floating for place in self.model.ball_places)
 
     @cached_property
     def q_joints(self) -> slice:
@@ -63,7 +68,7 @@ class JointSpace(Controller[ControllerState]):
 
     @checks_types
     def joint_states(self, measurement: Measurement, setpoint: Setpoint) -> tuple[Array, Array, Array, Array]:
-        """Return q and v of the joints as measured, and as the setpoint has them (n,)."""
+        """Return q and v of the joints as measured, and as the setpoint has them."""
         q, v = self.q_joints, self.v_joints
         return measurement.q[q], measurement.v[v], setpoint.q[q], setpoint.v[v]
 
@@ -92,12 +97,22 @@ class PD(JointSpace[None], pure=True):
     @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         states = self.joint_states(measurement, setpoint)
-        return self.all_torques(pd_torque(*states, self.kp, self.kd)), None
+        return self.all_torques(pd_torque(*states, self.kp, self.kd, self.balls)), None
 
 
-def pd_torque(q: Array, v: Array, q_wanted: Array, v_wanted: Array, kp: Array, kd: Array) -> Array:
-    """Return kp (q* - q) + kd (v* - v), for arrays of any scalar."""
-    tau: Array = kp * (q_wanted - q) + kd * (v_wanted - v)
+def pd_torque(
+    q: Array,
+    v: Array,
+    q_wanted: Array,
+    v_wanted: Array,
+    kp: Array,
+    kd: Array,
+    balls: Sequence[int] = (),
+) -> Array:
+    """Return kp (q* - q) + kd (v* - v), for arrays of any scalar, with the errors of ball joints that
+    `dynx.control.ball_setpoints` defines; their quaternions begin at `balls`."""
+    v_wanted, _ = in_present_axes(q, v, q_wanted, v_wanted, v_wanted, balls)
+    tau: Array = kp * position_error(q, q_wanted, balls) + kd * (v_wanted - v)
     return tau
 
 
@@ -170,8 +185,8 @@ class PID(JointSpace[Floats], pure=True):
         """Return the torque (nv,) within the limits, and the next integral part."""
         require_state(state, self.n_joints, self.n_joints)
         q, v, q_wanted, v_wanted = self.joint_states(measurement, setpoint)
-        error = q_wanted - q
-        wanted = state + pd_torque(q, v, q_wanted, v_wanted, self.kp, self.kd)
+        error = position_error(q, q_wanted, self.balls)
+        wanted = state + pd_torque(q, v, q_wanted, v_wanted, self.kp, self.kd, self.balls)
         tau = clamp(wanted, self.limit)
         # A factor above 1 would overcompensate the torque beyond the limits.
         share = min(1.0, self.control_dt / self.tracking_time)
@@ -210,7 +225,13 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
         weight = self.dynamics.gravity_torque(measurement.q)
         weight = self.with_joint_dynamics(weight, measurement.q, setpoint.v, 0.0 * setpoint.a, setpoint.v)
         return weight + pd_torque(
-            measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd
+            measurement.q,
+            measurement.v,
+            setpoint.q,
+            setpoint.v,
+            self.kp,
+            self.kd,
+            self.model.ball_places,
         ), None
 
 
@@ -242,4 +263,5 @@ class FeedForward(ModelBased[None], pure=True):
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         tau = self.dynamics.inverse_dynamics(*setpoint)
         tau = self.with_joint_dynamics(tau, setpoint.q, setpoint.v, setpoint.a, setpoint.v)
-        return tau + pd_torque(measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd), None
+        (_, q, v), balls = measurement, self.model.ball_places
+        return tau + pd_torque(q, v, setpoint.q, setpoint.v, self.kp, self.kd, balls), None

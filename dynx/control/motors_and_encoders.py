@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types
 from dynx.control.base import Controller, Measurement, Wrapper, parameter, require_state
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.numbers import checked_gain, is_real, positive_seconds, real_array
 from dynx.spatial.scalar import Array, Floats, arctan2
 from dynx.trajectory.base import Setpoint
@@ -151,6 +152,7 @@ class Encoders(_StatefulWrapper, pure=True):
         Raises GainError for a resolution that is not above 0, ArgumentError for an invalid control step.
         """
         dt = self._with_step(inner, control_dt)
+        refuse_ball_joints(inner.model, "control.Encoders")
         n = len(inner.model.joint_names)
         steps = checked_gain("resolution", resolution, n, per="one for each joint")
         if not steps.all():

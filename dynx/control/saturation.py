@@ -69,7 +69,8 @@ def checked_limit(
         if given.shape not in ((), (n,)) or not (given >= 0.0).all():
             raise GainError(f"{name} is {shown(limit)}; wanted one number, or {n}, 0 or more")
         efforts = np.concatenate([np.full(base, np.inf), np.broadcast_to(given, (n,))])
-    without = [name for name, effort in zip(model.joint_names, efforts[base:], strict=True) if effort == 0.0]
+    names = model.coordinate_names
+    without = [name for name, effort in zip(names, efforts[base:], strict=True) if effort == 0.0]
     if without:
         listed = ", ".join(shown(name) for name in without[:6])
         more = f" and {len(without) - 6} more" if len(without) > 6 else ""

@@ -17,6 +17,7 @@ from dynx.envs.randomization import AXES, Parameter, Randomization, parameters_o
 from dynx.envs.task import DESCRIBED, JointOptions, RobotTask
 from dynx.errors import UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import JointCoefficients
 from dynx.rbd.parameters import JOINT, POINT, SPRING, Parameters
 from dynx.spatial.scalar import Array, Floats
@@ -52,6 +53,7 @@ class VariedRobot:
                 "its joints is joint_friction"
             )
         self._task, model = task, task.model
+        refuse_ball_joints(model, "an environment of one robot")
         self.stops = joints.joint_limits and bool(np.isfinite(stop_positions(model)).any())
         """True if joints stop at limits."""
         self._model = model

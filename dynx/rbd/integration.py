@@ -1,25 +1,26 @@
 """Integration of a robot's motion, for arrays of any scalar: semi-implicit and explicit Euler, Runge-Kutta 4.
 
 Each scheme takes one step of length h from the state (q, v) under a constant torque, and depends on its
-arguments alone. `accelerate(q, v, *given)` returns the acceleration. The quaternion of a floating base is a
-point of the unit sphere, so increments cannot simply be added to it.
+arguments alone. `accelerate(q, v, *given)` returns the acceleration. The quaternions of a floating base and
+of ball joints are points of the unit sphere, so increments cannot simply be added to them.
 
 Under semi-implicit Euler a floating base moves as in Bullet (btMultiBody): Euler's method is applied to the
 velocity of the root's centre of mass and to its angular velocity, both in world axes. Because those axes do
-not rotate, a free body keeps its linear momentum exactly.
+not rotate, a free body keeps its linear momentum exactly. A ball joint turns by the rotation vector h v', in
+the axes of its child, as in MuJoCo.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.spatial.branchless import quat_exp
+from dynx.spatial.manifold import coordinate_runs, integrate
 from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import cross, quat_product, rotate, rotate_back, rotation_from_quat
 
@@ -30,12 +31,19 @@ MotionState = tuple[Array, Array, Array]
 
 
 def floating_step(
-    q: Array, v: Array, a: Array, h: float, center: Array, moves: Array | float = 1.0
+    q: Array,
+    v: Array,
+    a: Array,
+    h: float,
+    center: Array,
+    moves: Array | float = 1.0,
+    balls: Sequence[int] = (),
 ) -> tuple[Array, Array]:
     """Return q (nq,) and v (nv,) after a step of length `h` [s] with acceleration `a` (nv,).
 
-    `center` (3,) [m] is the centre of mass of the root, in the axes of the base frame. Joints where `moves`
-    is 0 and not 1 end at rest.
+    `center` (3,) [m] is the centre of mass of the root, in the axes of the base frame. Coordinates where
+    `moves` is 0 and not 1 end at rest. `balls` are the indices in ``q[7:]`` at which the quaternions of ball
+    joints begin.
     """
     R, w = rotation_from_quat(q[3:7]), v[3:6]
     lever = cross(w, center)
@@ -51,7 +59,17 @@ def floating_step(
     w_next = rotate_back(R_next, angular)
     joints = moves * (v[6:] + h * a[6:])
     v_next = np.concatenate([rotate_back(R_next, linear) - cross(w_next, center), w_next, joints])
-    return np.concatenate([at - R_next @ center, quat, q[7:] + h * joints]), v_next
+    return np.concatenate([at - R_next @ center, quat, moved_joints(q[7:], h * joints, balls)]), v_next
+
+
+def moved_joints(q: Array, step: Array, balls: Sequence[int]) -> Array:
+    """Return the positions of joints q (n,) after a displacement; `balls` as in `floating_step`."""
+    return integrate(q, step, floating=False, balls=balls) if balls else np.asarray(q + step)
+
+
+def _balls_of(model: Model) -> tuple[int, ...]:
+    """Return the indices in the positions of the joints at which the quaternions of ball joints begin."""
+    return tuple(place - 7 * model.floating for place in model.ball_places)
 
 
 class SemiImplicitEuler:
@@ -59,8 +77,8 @@ class SemiImplicitEuler:
 
     def __init__(self, model: Model, h: float, center: Array | None = None) -> None:
         """`center` (3,) [m] is the centre of mass of the root, by default that of `model`."""
-        refuse_ball_joints(model, "an integrator")
         self._floating = model.floating
+        self._balls = _balls_of(model)
         self._h: Array = np.full(model.nv, h)
         self._step = h
         if center is None:
@@ -81,11 +99,11 @@ class SemiImplicitEuler:
         v = v + h * a
         if moves is not None:
             v = moves * v
-        return q + h * v, v, a
+        return moved_joints(q, h * v, self._balls), v, a
 
     def _float(self, q: Array, v: Array, a: Array, moves: Array | None) -> MotionState:
         held = 1.0 if moves is None else moves[6:]
-        return *floating_step(q, v, a, self._step, self._center, held), a
+        return *floating_step(q, v, a, self._step, self._center, held, self._balls), a
 
 
 class ExplicitEuler:
@@ -95,41 +113,49 @@ class ExplicitEuler:
     """
 
     def __init__(self, model: Model, h: float) -> None:
-        refuse_ball_joints(model, "an integrator")
         if model.floating:
             raise UnsupportedFeatureError("the integrator euler is for robots with a fixed base")
-        self._h = h
+        self._h, self._balls = h, _balls_of(model)
 
     def __call__(self, accelerate: Accelerate, q: Array, v: Array, *given: Any) -> MotionState:
         """Return q and v after the step, and the acceleration at its beginning."""
         a = accelerate(q, v, *given)
-        return q + self._h * v, v + self._h * a, a
+        return moved_joints(q, self._h * v, self._balls), v + self._h * a, a
 
 
 class Flow:
-    """Time derivative of the state y = (q, v); between steps its quaternion need not be of unit length."""
+    """Time derivative of the state y = (q, v); between steps its quaternions need not be of unit length."""
 
     def __init__(self, model: Model) -> None:
-        refuse_ball_joints(model, "an integrator")
-        self._floating = model.floating
+        self._floating, self._balls = model.floating, model.ball_places
+        self._quaternions = model.quaternions
         self.nq = model.nq
 
     def configuration(self, y: Array) -> Array:
-        """Return q with its quaternion on the unit sphere."""
+        """Return q with its quaternions on the unit sphere."""
         q = y[: self.nq]
-        if self._floating:
+        if self._quaternions:
             q = q.copy()
-            q[3:7] /= np.sqrt(q[3:7].dot(q[3:7]))
+            for first in self._quaternions:
+                quat = q[first : first + 4]
+                q[first : first + 4] = quat / np.sqrt(quat.dot(quat))
         return q
 
     def __call__(self, accelerate: Accelerate, y: Array, given: tuple[Any, ...]) -> Array:
         v = y[self.nq :]
         q = self.configuration(y)
         a = accelerate(q, v, *given)
-        if not self._floating:
+        if not self._quaternions:
             return np.concatenate([v, a])
-        turning = 0.5 * quat_product(y[3:7], np.array([v[3], v[4], v[5], 0.0]))
-        return np.concatenate([rotate(rotation_from_quat(q[3:7]), v[:3]), turning, v[6:], a])
+        rates = []
+        for kind, of_q, of_v in coordinate_runs(self.nq, floating=self._floating, balls=self._balls):
+            rate, omega = v[of_v], v[of_v][-3:]
+            if kind == "base":
+                rates.append(rotate(rotation_from_quat(q[3:7]), rate[:3]))
+            if kind != "joints":
+                rate = 0.5 * quat_product(y[of_q][-4:], np.array([omega[0], omega[1], omega[2], 0.0]))
+            rates.append(rate)
+        return np.concatenate([*rates, a])
 
 
 class RungeKutta4:

@@ -80,7 +80,7 @@ def sustained_overshoot(
     oscillates = np.asarray(sliding_window_view(reverses, MIN_REVERSALS, axis=0).all(axis=-1).any(axis=0))
     if not oscillates.any() or controller is None:
         return None
-    names = [name for name, found in zip(controller.model.joint_names, oscillates, strict=True) if found]
+    names = [name for name, found in zip(controller.model.coordinate_names, oscillates, strict=True) if found]
     unstable = (
         each
         for each in _overshoots(controller, q, control_dt, armature)
@@ -110,9 +110,9 @@ def _overshoots(
     if controller is None:
         return []
     *_, inner = chain_of(controller)
-    if not inner.model.joint_names:
+    if not inner.model.coordinate_names:
         return []
-    n = len(inner.model.joint_names)
+    n = len(inner.model.coordinate_names)
     if isinstance(inner, control.ComputedTorque):
         ratio, by_inertia = inner.kd[-n:] * control_dt, False
     else:
@@ -126,7 +126,7 @@ def _overshoots(
     gain = "damping" if isinstance(inner, control.Impedance) else "kd"
     return [
         Overshoot(name, float(each), gain, by_inertia)
-        for name, each in zip(inner.model.joint_names, ratio, strict=True)
+        for name, each in zip(inner.model.coordinate_names, ratio, strict=True)
         if each > 1.0
     ]
 
@@ -148,7 +148,7 @@ def overcompensated_friction(controller: Controller[Any] | None, plant: JointFri
             return None
         worst = int(np.argmax(ours - theirs))
         if ours[worst] > theirs[worst]:
-            joint = own.model.joint_names[worst]
+            joint = own.model.coordinate_names[worst]
             return (
                 f"the compensation adds {name} of {ours[worst]:.4g} {unit} at {joint}, "
                 f"where the plant has {theirs[worst]:.4g}, and so drives the joint away; compensate at most "

@@ -16,6 +16,7 @@ from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, LimitError, LimitViolation
 from dynx.model import Model
 from dynx.model.configuration import checked_q
+from dynx.model.limited_positions import joint_ranges, limited_positions
 from dynx.model.numbers import checked_array, whole_number
 from dynx.rbd.parameters import plant_model
 from dynx.sim.controller_checks import check_controller
@@ -247,10 +248,8 @@ def _held(model: Model, q: Any, within_limits: bool) -> SetpointOf:
     if held.ndim != 1:
         raise ArgumentError(f"reference has shape {held.shape}; wanted a trajectory or ({model.nq},)")
     if within_limits:
-        joints = slice(7 if model.floating else 0, None)
-        rows = zip(
-            model.coordinate_joints, held[joints], model.lower[joints], model.upper[joints], strict=True
-        )
+        positions, ranges = limited_positions(model, held), joint_ranges(model)
+        rows = zip(model.coordinate_joints, positions, *ranges, strict=True)
         found = [
             LimitViolation(joint.name, "position", 0.0, float(x), float(low if x < low else high), joint.unit)
             for joint, x, low, high in rows

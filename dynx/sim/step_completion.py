@@ -21,6 +21,8 @@ from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.status import Status
 from dynx.compiled.step import BoundSteps, StepText, compiled
+from dynx.model import Model
+from dynx.model.limited_positions import joint_ranges
 from dynx.rbd.joint_friction import FrictionLaw
 from dynx.sim.loop_step import LoopStep
 from dynx.simd.kernel import Kernel
@@ -60,6 +62,11 @@ class Settling:
                 if not (status[group] >= Status.UNSETTLED).any():
                     break
             modes[group] = one_by_one[group] = 0.0
+
+
+def stops_balls(model: Model) -> bool:
+    """Check whether a robot has both ball joints and joints with limits, whose stops are not compiled."""
+    return bool(model.ball_joints) and bool(np.isfinite(joint_ranges(model)).any())
 
 
 class LaneStops:

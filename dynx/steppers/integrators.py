@@ -12,7 +12,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, EngineError, nearest, shown
 from dynx.model import Model
-from dynx.rbd.integration import Accelerate, Flow, MotionState, SemiImplicitEuler
+from dynx.rbd.integration import Accelerate, Flow, MotionState, SemiImplicitEuler, moved_joints
 from dynx.spatial.scalar import Array, Floats
 
 if TYPE_CHECKING:
@@ -47,7 +47,8 @@ class CompiledBaseEuler(SemiImplicitEuler):
         base.run()
         pose, twist = base.results
         joints = held * (v[6:] + h * a[6:])
-        return np.concatenate([pose, q[7:] + h * joints]), np.concatenate([twist, joints]), a
+        moved = moved_joints(q[7:], h * joints, self._balls)
+        return np.concatenate([pose, moved]), np.concatenate([twist, joints]), a
 
 
 class Adaptive:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from operator import le
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynx.model import Model
+from dynx.model.limited_positions import rotation_angle
 from dynx.spatial.scalar import Array, Floats
 from dynx.steppers.layout import stop_positions
 
@@ -30,6 +32,9 @@ class JointStops:
     zero and changes the velocities of the other joints according to the mass matrix:
     v+ = v - M^-1 E (E' M^-1 E)^-1 E' v. An impulse only pushes inwards, so a joint that already moves inwards
     gets none. Steps in which no joint is beyond its limits cost one comparison for each limit.
+
+    A ball joint beyond its largest angle is turned back to it about the axis n of its rotation. Its angle
+    changes at the rate n . w, so the impulse is about n: a column of E.
     """
 
     def __init__(self, model: Model, mass_matrix: Callable[[Floats], Floats]) -> None:
@@ -40,10 +45,13 @@ class JointStops:
         self._lowest, self._highest = self._lower.tolist(), self._upper.tolist()
         self._unit_impulses: Floats = np.eye(model.nv)
         self._mass_matrix = mass_matrix
+        self._balls = _BallStops(model) if model.ball_joints else None
 
     def __call__(self, before: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats] | None:
         """Return the state after the impacts of a step from the configuration `before` (nq,) to q, v; None if
         no joint stops."""
+        if self._balls is not None:
+            return self._stop_along(before, q, v, self._balls)
         joints = q[self._q_joints]
         values = joints.tolist()
         if all(map(le, self._lowest, values)) and all(map(le, values, self._highest)):
@@ -69,6 +77,71 @@ class JointStops:
                 break
             outward, columns, effects = outward[pushing], columns[pushing], effects[:, pushing]
         return q, v
+
+    def _stop_along(
+        self, before: Floats, q: Floats, v: Floats, balls: _BallStops
+    ) -> tuple[Floats, Floats] | None:
+        """Return what `__call__` returns, for a robot with ball joints."""
+        in_q, in_v = balls.plain
+        held, impacts = held_at_limits(
+            before[in_q],
+            q[in_q],
+            v[in_v],
+            *(bound[in_q - self._q_joints.start] for bound in (self._lower, self._upper)),
+        )
+        turned = balls.held(before, q)
+        if not turned and (held == q[in_q]).all():
+            return None
+        q = q.copy()
+        q[in_q] = held
+        struck = np.flatnonzero(impacts)
+        columns = [impacts[k] * self._unit_impulses[in_v[k]] for k in struck.tolist()]
+        for place, first, axis, angle in turned:
+            q[place : place + 4] = [*(axis * math.sin(0.5 * angle)), math.cos(0.5 * angle)]
+            if axis @ v[first : first + 3] > 0.0:
+                columns.append(np.zeros(len(v)))
+                columns[-1][first : first + 3] = axis
+        if not columns:
+            return q, v
+        outward = np.array(columns).T
+        effects = np.linalg.solve(self._mass_matrix(q), outward)
+        while outward.size:
+            impulse = np.linalg.solve(outward.T @ effects, -(outward.T @ v))
+            pushing = impulse <= 0.0
+            if pushing.all():
+                v = v + effects @ impulse
+                break
+            outward, effects = outward[:, pushing], effects[:, pushing]
+        return q, v
+
+
+class _BallStops:
+    """Places of ball joints with a largest angle, and of the joints with one coordinate."""
+
+    def __init__(self, model: Model) -> None:
+        ones = [joint for joint in model.coordinate_joints if joint.type != "ball"]
+        self.plain = (
+            np.array([model.position_index(joint.name) for joint in ones], dtype=np.intp),
+            np.array([model.coordinate_index(joint.name) for joint in ones], dtype=np.intp),
+        )
+        """Indices of the joints with one coordinate, in q and in v."""
+        self._limited = [
+            (model.position_index(joint.name), model.coordinate_index(joint.name), joint.limits.upper)
+            for joint in model.ball_joints
+            if joint.limits.upper < math.pi
+        ]
+
+    def held(self, before: Floats, q: Floats) -> list[tuple[int, int, Floats, float]]:
+        """Return the ball joints that passed their largest angle in a step: index in q, index in v, axis (3,)
+        of the rotation, and angle at which it stops."""
+        found = []
+        for place, first, upper in self._limited:
+            quat = slice(place, place + 4)
+            angle = float(rotation_angle(q[quat]))
+            if angle > upper and angle > (most := max(upper, float(rotation_angle(before[quat])))):
+                vector = q[place : place + 3] * math.copysign(1.0, q[place + 3])
+                found.append((place, first, vector / np.linalg.norm(vector), most))
+        return found
 
 
 def bounds_of_step(start: Array, lower: Array, upper: Array) -> tuple[Array, Array]:

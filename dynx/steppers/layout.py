@@ -57,8 +57,8 @@ class Collider:
 
 
 def stop_positions(model: Model) -> tuple[Floats, Floats]:
-    """Return the lowest and the highest position (n,) [rad or m] of each joint of `joint_names`; infinite
-    where it has no stop."""
+    """Return the lowest and the highest value (n,) [rad or m] of each position of a joint, in q; infinite
+    where it has no stop, as those of a quaternion (`joint_stops.BallStops` has those of ball joints)."""
     joints = slice(7 if model.floating else 0, None)
     return model.lower[joints], model.upper[joints]
 

@@ -32,7 +32,7 @@ def notes_on_springs(
     values, vectors = np.linalg.eigh(root[:, None] * np.linalg.pinv(M, hermitian=True) * root)
     ratio = float(values[-1])
     if ratio > bound:
-        joint = model.joint_names[int(np.argmax(np.abs(vectors[6 * model.floating :, -1])))]
+        joint = model.coordinate_names[int(np.argmax(np.abs(vectors[6 * model.floating :, -1])))]
         most = h * np.sqrt(bound / ratio)
         yield (
             f"the spring of {shown(robot + joint)} is stiff for steps of {h:.3g} s: k dt^2 is {ratio:.3g} "

@@ -2,10 +2,12 @@
 
     q(t) = q0 (+) x(t),  v = dx/dt,  a = d2x/dt2
 
-where (+) is `model.integrate`, a sum for joints. For a floating base the first six components of x must be a
-multiple s(t) of one body twist d, which the caller ensures: the base moves along the screw exp(s d), and its
-velocity in its own axes is then exactly ds/dt d (Murray, Li and Sastry, A Mathematical Introduction to
-Robotic Manipulation, section 2.3). Outside the duration the robot is at rest (`Trajectory`).
+where (+) is `model.integrate`, a sum for joints with one coordinate. For a floating base the first six
+components of x must be a multiple s(t) of one body twist d, which the caller ensures: the base moves along
+the screw exp(s d), and its velocity in its own axes is then exactly ds/dt d (Murray, Li and Sastry, A
+Mathematical Introduction to Robotic Manipulation, section 2.3). So must the three components of a ball joint,
+whose child then turns about one axis (spherical linear interpolation). Outside the duration the robot is at
+rest (`Trajectory`).
 """
 
 from __future__ import annotations
@@ -15,9 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, ShapeError
+from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_array, checked_entries, real_array
 from dynx.spatial.scalar import Floats
@@ -27,8 +28,8 @@ from dynx.trajectory.curve import Curve
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DisplacementTrajectory(Trajectory):
-    """`start.q` displaced along a curve that begins at 0; `floating` is the model if its base floats,
-    else None."""
+    """`start.q` displaced along a curve that begins at 0; `floating` is the model if its q has quaternions,
+    of a floating base or of ball joints, else None."""
 
     curve: Curve
     floating: Model | None = None
@@ -59,29 +60,39 @@ class Ends:
         return len(self.displacement)
 
     @property
-    def floating(self) -> Model | None:
-        """The model if its base floats, else None."""
-        return self.model if self.model is not None and self.model.floating else None
+    def turning(self) -> Model | None:
+        """The model if its q has quaternions, else None."""
+        return self.model if self.model is not None and self.model.quaternions else None
 
     def name(self, k: int) -> str:
         """Return the name of coordinate k of a velocity, for messages."""
-        offset = 6 if self.floating is not None else 0
+        offset = 6 if self.model is not None and self.model.floating else 0
         if self.model is None or k < offset:
             return f"coordinate {k}"
-        return f"joint '{self.model.joint_names[k - offset]}'"
+        return f"joint '{self.model.coordinate_names[k - offset]}'"
 
     def velocity(self, name: str, value: ArrayLike | None) -> Floats:
         """Return a velocity or an acceleration (nv,) at an end, zeros if it is not given.
 
-        The entries of a floating base must be zero: it moves along one screw axis from rest to rest.
+        The entries of a floating base and of ball joints must be zero: they move along one screw axis from
+        rest to rest.
         """
         if value is None:
             return np.zeros(self.nv)
         array = checked_array(name, value, self.nv)
         if array.ndim != 1:
             raise ShapeError(f"{name} has shape {array.shape}; wanted ({self.nv},)")
-        if self.floating is not None and array[:6].any():
+        if self.model is None:
+            return array
+        if self.model.floating and array[:6].any():
             raise ArgumentError(f"{name}[:6] is not 0; a floating base can only go from rest to rest")
+        for joint in self.model.ball_joints:
+            k = self.model.coordinate_index(joint.name)
+            if array[k : k + 3].any():
+                raise ArgumentError(
+                    f"{name}[{k}:{k + 3}] is not 0; the ball joint {shown(joint.name)} can only go from rest "
+                    "to rest"
+                )
         return array
 
     def trajectory(
@@ -91,13 +102,15 @@ class Ends:
         checked). Its setpoints at the times 0 and `duration` have the (v, a) given; those between have the
         derivatives of the curve."""
         q1 = self.q1
-        if self.floating is not None:
+        if self.turning is not None:
             # A quaternion and its negative are one orientation: take the one that the motion reaches.
-            arrived = self.floating.integrate(self.q0, self.displacement)
-            if np.dot(arrived[3:7], q1[3:7]) < 0.0:
-                q1 = np.concatenate([q1[:3], -q1[3:7], q1[7:]])
+            arrived, q1 = self.turning.integrate(self.q0, self.displacement), q1.copy()
+            for first in self.turning.quaternions:
+                quat = slice(first, first + 4)
+                if np.dot(arrived[quat], q1[quat]) < 0.0:
+                    q1[quat] *= -1.0
         return DisplacementTrajectory(
-            duration, read_only_setpoint(self.q0, *start), read_only_setpoint(q1, *end), curve, self.floating
+            duration, read_only_setpoint(self.q0, *start), read_only_setpoint(q1, *end), curve, self.turning
         )
 
     def rest_to_rest(self, duration: float, curve: Curve) -> DisplacementTrajectory:
@@ -127,7 +140,6 @@ def configuration(name: str, q: ArrayLike, model: Model | None) -> Floats:
         array = checked_entries(name, real_array(name, q))
         wanted = "(nq,)"
     else:
-        refuse_ball_joints(model, "a trajectory")
         array = checked_q(model, q, name)
         wanted = f"({model.nq},)"
     if array.ndim != 1 or not array.size:

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types
 from dynx.errors import ShapeError, TrajectoryError
 from dynx.model import Model
+from dynx.spatial.manifold import coordinate_runs
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, quat_product, rotate_back, rotation_from_quat
 from dynx.trajectory.base import Setpoint, Trajectory, checked_duration, read_only_setpoint
@@ -71,11 +72,12 @@ class ChebyshevPieces(Curve):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FormulaTrajectory(Trajectory):
-    """A configuration along a curve (k = nq); `floating` if its first seven coordinates are those of a
-    base."""
+    """A configuration along a curve (k = nq); `floating` if its first seven coordinates are those of a base;
+    `balls` are the indices at which quaternions of ball joints begin."""
 
     curve: Curve
     floating: bool
+    balls: tuple[int, ...] = ()
 
     @property
     def knots(self) -> Floats:
@@ -83,21 +85,33 @@ class FormulaTrajectory(Trajectory):
 
     def inside(self, t: Floats) -> Setpoint:
         """Return q of the curve, and v and a by its derivatives."""
-        return _setpoint(*self.curve(t), floating=self.floating)
+        return _setpoint(*self.curve(t), floating=self.floating, balls=self.balls)
 
 
-def _setpoint(q: Floats, dq: Floats, ddq: Floats, *, floating: bool) -> Setpoint:
-    """Return the setpoint with velocity and acceleration of a base in its own axes.
+def _setpoint(q: Floats, dq: Floats, ddq: Floats, *, floating: bool, balls: tuple[int, ...]) -> Setpoint:
+    """Return the setpoint with velocity and acceleration of a base, and of the children of ball joints, in
+    their own axes.
 
     omega = 2 conj(quat) dquat and, since conj(dquat) dquat is a scalar, alpha = 2 conj(quat) ddquat.
     """
-    if not floating:
+    if not floating and not balls:
         return Setpoint(q, dq, ddq)
-    R, back = rotation_from_quat(q[:, 3:7]), q[:, 3:7] * [-1.0, -1.0, -1.0, 1.0]
-    omega, alpha = (2.0 * quat_product(back, rate[:, 3:7])[:, :3] for rate in (dq, ddq))
-    velocity = rotate_back(R, dq[:, :3])
-    acceleration = rotate_back(R, ddq[:, :3]) - cross(omega, velocity)
-    return Setpoint(q, np.hstack([velocity, omega, dq[:, 7:]]), np.hstack([acceleration, alpha, ddq[:, 7:]]))
+    velocities, accelerations = [], []
+    for kind, of_q, _ in coordinate_runs(q.shape[1], floating=floating, balls=balls):
+        value, rate, second = q[:, of_q], dq[:, of_q], ddq[:, of_q]
+        if kind != "joints":
+            back = value[:, -4:] * [-1.0, -1.0, -1.0, 1.0]
+            omega, alpha = (2.0 * quat_product(back, each[:, -4:])[:, :3] for each in (rate, second))
+        if kind == "base":
+            R = rotation_from_quat(value[:, 3:])
+            velocity = rotate_back(R, rate[:, :3])
+            acceleration = rotate_back(R, second[:, :3]) - cross(omega, velocity)
+            rate, second = np.hstack([velocity, omega]), np.hstack([acceleration, alpha])
+        elif kind == "ball":
+            rate, second = omega, alpha
+        velocities.append(rate)
+        accelerations.append(second)
+    return Setpoint(q, np.hstack(velocities), np.hstack(accelerations))
 
 
 @checks_types
@@ -109,7 +123,8 @@ def from_function(
     `f` takes one time and returns one configuration (nq,); it is called here and never again, so the
     trajectory can be pickled whatever `f` is. Velocity and acceleration are those of an interpolant that
     equals `f` to 1e-13 of the largest value of each coordinate. If `model` is given, dynx checks the
-    configurations. For a floating base `model` is required, and the quaternion must not change its sign.
+    configurations. For a floating base and for ball joints
+    `model` is required, and quaternions must not change their signs.
 
     Raises TrajectoryError, with the time, where `f` is not smooth: join smooth motions by `concatenate`, or
     give velocity and acceleration yourself by a class with `Trajectory.inside`. Raises ShapeError,
@@ -118,6 +133,7 @@ def from_function(
     seconds = checked_duration(duration)
     first = configuration("f(0)", f(0.0), model)
     floating = model is not None and model.floating
+    balls = () if model is None else model.ball_places
 
     def values(times: Floats) -> Floats:
         found = [configuration(f"f({t:.6g})", f(t), model) for t in times.tolist()]
@@ -129,12 +145,12 @@ def from_function(
         return np.array(found)
 
     curve = _interpolated(values, seconds)
-    ends = [_setpoint(*curve(np.array([t])), floating=floating) for t in (0.0, seconds)]
+    ends = [_setpoint(*curve(np.array([t])), floating=floating, balls=balls) for t in (0.0, seconds)]
     last = values(np.array([seconds]))[0]
     start, end = (
         read_only_setpoint(q, each.v[0], each.a[0]) for q, each in zip((first, last), ends, strict=True)
     )
-    return FormulaTrajectory(seconds, start, end, curve, floating)
+    return FormulaTrajectory(seconds, start, end, curve, floating, balls)
 
 
 def _interpolated(values: Callable[[Floats], Floats], duration: float) -> ChebyshevPieces:

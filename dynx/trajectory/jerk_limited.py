@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, TrajectoryError, importing, nonblank_lines
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import MAX_DURATION, MIN_DURATION, Trajectory
 from dynx.trajectory.curve import PiecewisePolynomial
@@ -51,8 +52,10 @@ def time_optimal(
     example if an end exceeds the limits), ArgumentError for invalid arguments.
     """
     ends = checked_ends(q0, q1, model)
-    if ends.floating is not None:
-        raise ArgumentError(f"{ends.floating.name} has a floating base; use s_curve, which follows one screw")
+    if model is not None and model.floating:
+        raise ArgumentError(f"{model.name} has a floating base; use s_curve, which follows one screw")
+    if model is not None:
+        refuse_ball_joints(model, "time_optimal, unlike s_curve,")
     limits = {
         "velocity": velocity_limits(velocity, ends),
         "acceleration": checked_limit("acceleration", acceleration, ends.nv),

@@ -13,7 +13,7 @@ from dynx.backends import Backend
 from dynx.backends import backend as make_backend
 from dynx.errors import ArgumentError, LimitError, LimitViolation, ShapeError, shown
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
+from dynx.model.limited_positions import joint_ranges, limited_positions
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
@@ -83,7 +83,6 @@ def violations(
     """
     if not isinstance(trajectory, Trajectory):
         raise ArgumentError(f"trajectory is of type {type(trajectory).__name__}; wanted a Trajectory")
-    refuse_ball_joints(model, "a check of limits")
     if (trajectory.nq, trajectory.nv) != (model.nq, model.nv):
         raise ShapeError(
             f"the trajectory has nq {trajectory.nq}, nv {trajectory.nv}; "
@@ -98,16 +97,21 @@ def violations(
         refined = _refined_times(times, coarse)
         fine = list(_excesses(model, trajectory, refined, engine, joint_dynamics))
     times = np.concatenate([times, refined])
+    # The joint, by its number, of each column.
+    of_rates = [k for k, joint in enumerate(model.coordinate_joints) for _ in range(joint.n_rates)]
+    of_rates = [*[-1] * (model.nv - len(of_rates)), *of_rates]
+    owners = {"position": range(len(model.coordinate_joints)), "velocity": of_rates, "effort": of_rates}
     found = []
     for (quantity, *near), (_, *far) in zip(coarse, fine, strict=True):
         value, limit, excess = (np.concatenate(pair) for pair in zip(near, far, strict=True))
         worst, size = np.argmax(excess, axis=0), np.abs(value).max(axis=0)
         for k, row in enumerate(worst.tolist()):
             if excess[row, k] > RELATIVE_TOLERANCE * max(abs(limit[row, k]), size[k]):
-                joint = model.coordinate_joints[k - (6 if model.floating else 0)]
+                place = owners[quantity][k]
+                joint = model.coordinate_joints[place]
                 number = float(times[row]), float(value[row, k]), float(limit[row, k])
                 unit = UNITS[quantity][joint.unit]
-                found.append((k, LimitViolation(joint.name, quantity, *number, unit)))
+                found.append((place, LimitViolation(joint.name, quantity, *number, unit)))
     return [violation for _, violation in sorted(found, key=lambda entry: entry[0])]
 
 
@@ -115,13 +119,8 @@ def _excesses(
     model: Model, trajectory: Trajectory, times: Floats, engine: Backend | None, joint_dynamics: bool
 ) -> Iterator[Excess]:
     q, v, a = trajectory(times)
-    joints = slice(7, None) if model.floating else slice(None)
-    base = np.zeros((len(times), 6 if model.floating else 0))
-    q_v = np.concatenate([base, q[:, joints]], axis=1)
-    unbounded = np.full(base.shape[1], np.inf)
-    lower = np.concatenate([-unbounded, model.lower[joints]])
-    upper = np.concatenate([unbounded, model.upper[joints]])
-    yield "position", q_v, *_nearest_limit(q_v, lower, upper)
+    positions = limited_positions(model, q)
+    yield "position", positions, *_nearest_limit(positions, *joint_ranges(model))
     yield "velocity", v, *_nearest_limit(v, -model.velocity_limit, model.velocity_limit)
     if engine is not None:
         tau = engine.inverse_dynamics(q, v, a, joint_dynamics=joint_dynamics)

@@ -29,6 +29,7 @@ from dynx.argument_types import checks_types
 from dynx.backends import Backend
 from dynx.errors import ArgumentError, TrajectoryError, importing
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory, read_only_setpoint
@@ -220,8 +221,10 @@ def time_optimal_path(
     points = checked_waypoints(waypoints)
     configuration("a waypoint", points[0], model)
     ends = Ends(points[0], points[-1], points[-1] - points[0], model)
-    if ends.floating is not None:
-        raise ArgumentError(f"{ends.floating.name} has a floating base; a path needs a fixed one")
+    if model is not None and model.floating:
+        raise ArgumentError(f"{model.name} has a floating base; a path needs a fixed one")
+    if model is not None:
+        refuse_ball_joints(model, "a path of waypoints")
     limited = effort is not False
     if acceleration is None and not limited:
         raise ArgumentError("acceleration is None and effort False; wanted a limit of one of them")

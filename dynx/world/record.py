@@ -82,14 +82,14 @@ def configuration_channel(model: Model, q: Floats) -> ConfigurationChannel:
 
 
 def coordinate_names(model: Model) -> tuple[str, ...]:
-    """Return the names of the coordinates of v: joints, after the six of a floating base."""
-    return (*(BASE_COORDINATES if model.floating else ()), *model.joint_names)
+    """Return the names of the coordinates of v: those of the joints, after the six of a floating base."""
+    return (*(BASE_COORDINATES if model.floating else ()), *model.coordinate_names)
 
 
 def coordinate_units(model: Model) -> tuple[str, ...]:
     """Return the unit of each coordinate of v: rad or m."""
     base = ("m", "m", "m", "rad", "rad", "rad") if model.floating else ()
-    return (*base, *(joint.unit for joint in model.coordinate_joints))
+    return (*base, *(joint.unit for joint in model.coordinate_joints for _ in range(joint.n_rates)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -105,40 +105,21 @@ REFUSED: dict[str, Callable[[Path], object]] = {
     "closed_form": lambda folder: dynx.ik.closed_form(MODEL, "hand"),
     "track": lambda folder: tracked(),
     "velocity_ik": lambda folder: velocity_ik(),
-    "cubic": lambda folder: trajectory.cubic(Q, Q, 1.0, model=MODEL),
-    "quintic": lambda folder: trajectory.quintic(Q, Q, 1.0, model=MODEL),
-    "cycloidal": lambda folder: trajectory.cycloidal(Q, Q, 1.0, model=MODEL),
-    "trapezoidal": lambda folder: trajectory.trapezoidal(
-        Q, MODEL.neutral(), velocity=1.0, acceleration=1.0, model=MODEL
-    ),
-    "from_function": lambda folder: trajectory.from_function(lambda t: Q, 1.0, model=MODEL),
     "line": lambda folder: trajectory.line(MODEL, "hand", Q, np.zeros(3), 1.0, backend="reference"),
     "time_optimal": lambda folder: trajectory.time_optimal(
         Q, MODEL.neutral(), acceleration=1.0, jerk=1.0, model=MODEL
     ),
     "excitation": lambda folder: trajectory.excitation(MODEL, 1.0),
     "Identifiability": lambda folder: trajectory.Identifiability(MODEL, backend="reference"),
-    "violations": lambda folder: trajectory.violations(
-        MODEL, trajectory.cubic([0.0], [1.0], 1.0), effort=False
-    ),
     "time_optimal_path": lambda folder: trajectory.time_optimal_path(
         [Q, MODEL.neutral()], velocity=1.0, acceleration=1.0, model=MODEL
     ),
-    "PD": lambda folder: control.PD(MODEL, kp=1.0, kd=1.0),
-    "PID": lambda folder: control.PID(MODEL, kp=1.0, ki=1.0, kd=1.0, control_dt=0.01),
-    "ComputedTorque": lambda folder: control.ComputedTorque(
-        MODEL, natural_frequency=10.0, backend="reference"
+    "simulate_batch with limits": lambda folder: dynx.simulate_batch(
+        MODEL, control.PD(MODEL, kp=1.0, kd=1.0), MODEL.neutral(), rollouts=2, duration=0.1
     ),
-    "GravityCompensatedPD": lambda folder: control.GravityCompensatedPD(
-        MODEL, kp=1.0, kd=1.0, backend="reference"
+    "Encoders": lambda folder: control.Encoders(
+        control.PD(MODEL, kp=1.0, kd=1.0), resolution=0.1, control_dt=0.01
     ),
-    "MomentumObserver": lambda folder: control.MomentumObserver(
-        MODEL, time_constant=0.1, backend="reference"
-    ),
-    "model_dynamics": lambda folder: control.model_dynamics(MODEL, "reference"),
-    "simulate": lambda folder: dynx.simulate(MODEL, duration=0.1, plant="reference"),
-    "simulate_batch": lambda folder: dynx.simulate_batch(MODEL, rollouts=2, duration=0.1),
-    "Scenario": lambda folder: dynx.Scenario(MODEL),
     "SceneRobot": lambda folder: dynx.world.SceneRobot("arm", MODEL),
     "read_scene": of_file(lambda path: dynx.world.read_scene(path)),
     "same_robot of models": lambda folder: dynx.same_robot(MODEL, STRAIGHT),
@@ -161,12 +142,12 @@ COMMANDS_THAT_COMPUTE = (
     ("mass", "ROBOT"),
     ("convert", "ROBOT", "--to", "sdf"),
     ("agree", "ROBOT", "--backends", "reference,compiled"),
+    ("sim", "ROBOT", "--duration", "0.1"),
 )
 COMMANDS_THAT_REFUSE = (
     ("id", "ROBOT", "--v", "shoulder=1"),
     ("convert", "ROBOT", "--to", "urdf"),
     ("ik", "ROBOT", "--target", "0,0,0.3"),
-    ("sim", "ROBOT"),
     ("doctor", "ROBOT"),
     ("same", "ROBOT", "ROBOT"),
     ("view", "ROBOT"),

@@ -21,6 +21,7 @@ from dynx.cli.sim.request import SimulationRequest
 from dynx.errors import DivergedError, SimulationError
 from dynx.model import Model
 from dynx.model.documents import pose_numbers
+from dynx.model.limited_positions import joint_ranges, limited_positions
 from dynx.sim import Noise, Rollout, RolloutInterrupted
 from dynx.sim.overshoot import Overshoot
 from dynx.sim.record.tracking_error import base_error, frame_error, joint_error
@@ -225,7 +226,7 @@ def _joints(model: Model, rollout: Rollout) -> list[dict[str, Any]]:
 def _names(model: Model) -> list[str]:
     """Return the names of the coordinates of v; those of a floating base are in its own axes."""
     base = ["base x", "base y", "base z", "base rx", "base ry", "base rz"] if model.floating else []
-    return [*base, *model.joint_names]
+    return [*base, *model.coordinate_names]
 
 
 def _settings(request: SimulationRequest, rollout: Rollout) -> Entry:
@@ -263,8 +264,7 @@ def _is_passive(request: SimulationRequest, rollout: Rollout) -> bool:
 
 def _reaches_limits(rollout: Rollout) -> bool:
     """Check whether a joint with stops was at one of its limits, where an impact takes energy."""
-    model, joints = rollout.model, slice(7 if rollout.model.floating else 0, None)
-    q, lower, upper = rollout.q[:, joints], model.lower[joints], model.upper[joints]
+    q, (lower, upper) = limited_positions(rollout.model, rollout.q), joint_ranges(rollout.model)
     return bool(rollout.settings["joint_limits"] and ((q <= lower) | (q >= upper)).any())
 
 

@@ -181,7 +181,7 @@ def refuse_unstable(
         return
     base = 6 if model.floating else 0
     _, vectors = np.linalg.eigh(scaled[row])
-    joint = model.joint_names[int(np.argmax(np.abs(vectors[base:, -1])))]
+    joint = model.coordinate_names[int(np.argmax(np.abs(vectors[base:, -1])))]
     where = joint if first is None else f"{joint} in rollout {first + row}"
     raise ArgumentError(
         f"friction_slip is {slip:g}, so small that dry friction oscillates from step to step: "

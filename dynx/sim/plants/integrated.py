@@ -62,12 +62,14 @@ class IntegratedPlant(Plant):
         found = ["pushes"] if self.disturbances.pushes else []
         if self.disturbances.sticks and isinstance(scheme, RungeKutta4):
             found.append("joint friction under the integrator rk4")
-        # For a floating base, floats and symbols are rounded differently.
+        # Floats and symbols of quaternions are rounded differently.
+        if self.model.ball_joints:
+            found.append("ball joints")
         if self.model.floating and isinstance(scheme, RungeKutta4):
             found.append("the integrator rk4 with a floating base")
         if isinstance(scheme, Adaptive):
             found.append("the integrator adaptive")
-        verb = "is" if len(found) == 1 and found != ["pushes"] else "are"
+        verb = "is" if len(found) == 1 and found[0] not in ("pushes", "ball joints") else "are"
         return f"{' and '.join(found)} {verb}" if found else ""
 
     @property

@@ -111,8 +111,8 @@ def _header(blocks: Sequence[Block]) -> list[str]:
 def coordinate_names(model: Model) -> tuple[list[str], list[str]]:
     """Return the names of the columns of positions and of rates."""
     positions, rates = (["x", "y", "z", "qx", "qy", "qz", "qw"], ["vx", "vy", "vz", "wx", "wy", "wz"])
-    joints = list(model.joint_names)
-    return [*(positions if model.floating else []), *joints], [*(rates if model.floating else []), *joints]
+    of_base = (positions, rates) if model.floating else ([], [])
+    return [*of_base[0], *model.position_names], [*of_base[1], *model.coordinate_names]
 
 
 _FORMULA = re.compile(r"[;\t]\s*[=+@-]")
@@ -262,7 +262,7 @@ def _rates(model: Model, t: Floats, q: Floats) -> Floats:
     """Return velocities (n, nv) by central differences, at the ends by one-sided ones."""
     before, after = np.maximum(np.arange(len(t)) - 1, 0), np.minimum(np.arange(len(t)) + 1, len(t) - 1)
     spans = (t[after] - t[before])[:, None]
-    if not model.floating:
+    if not model.quaternions:
         return model.difference(q[before], q[after]) / spans
     # Displacements are in the axes of the base where they begin: both are taken from the middle state.
     return (model.difference(q, q[after]) - model.difference(q, q[before])) / spans

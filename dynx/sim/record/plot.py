@@ -39,12 +39,15 @@ class Column(NamedTuple):
     """Coordinates that share panels: their names, and their indices in q and in v."""
 
     labels: tuple[str, ...]
-    q: slice
-    v: slice
+    q: slice | list[int]
+    v: slice | list[int]
     units: tuple[str, str]
     """Units of positions and of efforts."""
     of_base: bool = False
     """True if this is the column of a floating base: position in the world, all else in its own axes."""
+    of_ball: bool = False
+    """True if this is the column of a ball joint: the vector part of its quaternion, all else in the axes of
+    its child."""
 
 
 @checks_types
@@ -55,7 +58,8 @@ def plot(rollout: Rollout, path: str | os.PathLike[str] | None = None) -> Any:
     Without a reference it shows velocities instead of errors, and for a controller of a frame the error of
     that frame. A limit is drawn where a torque comes near it.
     A floating base has its own column: its position in the world, and its error, velocity and force in the
-    axes of the base. The figure belongs to no window. Raises NotInstalledError without matplotlib
+    axes of the base. So has a ball joint: the vector part of its quaternion, and the rest in the axes of its
+    child. The figure belongs to no window. Raises NotInstalledError without matplotlib
     (extra ``plot``), ArgumentError for a file that cannot be written.
     """
     columns, forces = _columns(rollout.model), _contact_forces(rollout)
@@ -101,10 +105,9 @@ def _draw_contacts(t: Floats, forces: dict[str, Floats], panels: Any) -> None:
 
 def _columns(model: Model) -> list[Column]:
     """Return the columns: one for a floating base, and the joints in equal shares."""
-    base_q, base_v = (7, 6) if model.floating else (0, 0)
     base = Column(("base x", "base y", "base z"), slice(0, 3), slice(0, 3), ("m", "N"), of_base=True)
     columns = [base] if model.floating else []
-    joints = model.coordinate_joints
+    joints = [joint for joint in model.coordinate_joints if joint.type != "ball"]
     shares = -(-len(joints) // PER_COLUMN) or (0 if columns else 1)
     ends = np.linspace(0, len(joints), shares + 1).round().astype(int).tolist()
     for begin, end in pairwise(ends):
@@ -114,8 +117,18 @@ def _columns(model: Model) -> list[Column]:
         if any(sliding) and not all(sliding):
             units = ("rad; m", "N m; N")
             labels = [name + " [m]" * slides for name, slides in zip(labels, sliding, strict=True)]
-        q, v = slice(base_q + begin, base_q + end), slice(base_v + begin, base_v + end)
+        names = [joint.name for joint in joints[begin:end]]
+        q, v = (
+            [model.position_index(each) for each in names],
+            [model.coordinate_index(each) for each in names],
+        )
         columns.append(Column(tuple(labels), q, v, units))
+    for joint in model.ball_joints:
+        # The position is the vector part of the quaternion.
+        q_first, v_first = model.position_index(joint.name), model.coordinate_index(joint.name)
+        labels = [f"{joint.name}.{axis}" for axis in "xyz"]
+        places = slice(q_first, q_first + 3), slice(v_first, v_first + 3)
+        columns.append(Column(tuple(labels), *places, ("rad", "N m"), of_ball=True))
     return columns
 
 
@@ -171,6 +184,8 @@ def _draw(rollout: Rollout, column: Column, axes: Any, frame: str | None) -> Non
     if frame is not None:
         middle.set_ylabel(f"error of {_plain(frame)} [m; rad]")
     efforts.set_ylabel(f"torque [{force}]" if "N m" in force else f"force [{force}]")
+    if column.of_ball:
+        positions.set_ylabel("vector part of the quaternion")
     if column.of_base:
         for axis, axes_of in ((positions, "world"), (middle, "base"), (efforts, "base")):
             axis.set_ylabel(f"{axis.get_ylabel()} ({axes_of} axes)")

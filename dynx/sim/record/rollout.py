@@ -16,6 +16,7 @@ from dynx.backends import Backend, backend
 from dynx.control.base import Controller
 from dynx.errors import ArgumentError, DynxError, UnsupportedFeatureError
 from dynx.model import Model
+from dynx.model.limited_positions import joint_ranges, limited_positions
 from dynx.model.numbers import whole_number
 from dynx.rbd.jacobians import LOCAL
 from dynx.rbd.joint_wrenches import about_world
@@ -30,7 +31,6 @@ from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of, refuse_u
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
 from dynx.steppers.joint_stops import MOVES_NO_FURTHER
-from dynx.steppers.layout import stop_positions
 from dynx.trajectory.base import Setpoint
 from dynx.trajectory.limit_check import UNITS
 from dynx.world.record import (
@@ -286,7 +286,7 @@ class Rollout:
         """Joint whose damping gain is unstable for the control step, so that its torque reverses in each of
         many successive steps. Only limits bound such an oscillation. None without such a joint, or without a
         scenario."""
-        scenario, n = self.scenario, len(self.model.joint_names)
+        scenario, n = self.scenario, len(self.model.coordinate_names)
         if scenario is None or not isinstance(scenario.controller, Controller) or not n:
             return None
         # Imported here, because most records are read without it.
@@ -372,8 +372,9 @@ class Rollout:
         if scenario is not None and scenario.joint_limits and not isinstance(scenario.plant, ScenePlant):
             from dynx.world.notes import beyond_limits, notes_on_held_joints, notes_on_limits
 
-            joints, names = q[7 if model.floating else 0 :], model.joint_names
-            own += notes_on_limits(beyond_limits(names, joints, *stop_positions(model)), MOVES_NO_FURTHER)
+            at = limited_positions(model, q)
+            beyond = beyond_limits(model.joint_names, at, *joint_ranges(model))
+            own += notes_on_limits(beyond, MOVES_NO_FURTHER)
             limits = [(each.name, each.limits) for each in model.coordinate_joints]
             own += notes_on_held_joints([name for name, each in limits if each.lower == each.upper])
         if scenario is not None and scenario.joint_springs and not isinstance(scenario.plant, ScenePlant):

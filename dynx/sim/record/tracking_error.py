@@ -29,7 +29,7 @@ def joint_error(rollout: Rollout) -> Entry:
     row, column = np.unravel_index(int(np.argmax(error)), error.shape)
     return {
         "max_error": float(error[row, column]),
-        "max_error_joint": rollout.model.joint_names[column],
+        "max_error_joint": rollout.model.coordinate_names[column],
         "max_error_time": float(rollout.t[row]),
         "rms_error": float(np.sqrt(np.mean(error**2))),
         "final_error": float(error[-1].max()),

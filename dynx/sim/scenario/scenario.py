@@ -17,7 +17,7 @@ from dynx.control.base import Controller, refuse_other_than_controller
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import check_document, parse_json
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
+from dynx.model.limited_positions import joint_ranges
 from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
 from dynx.model.package_search import StrPath
@@ -43,7 +43,6 @@ from dynx.sim.scenario.documents import NUMBERS as CONTROLLER_NUMBERS
 from dynx.sim.scenario.options import FORMER_NAMES, OPTIONS, SimulationOptions, as_array
 from dynx.steppers.clock import TIME_ROUNDING, Clock
 from dynx.steppers.forces import ExternalForce
-from dynx.steppers.layout import stop_positions
 from dynx.trajectory.base import Trajectory
 
 SCHEMA = "dynx.scenario/2"
@@ -113,7 +112,6 @@ class Scenario(SimulationOptions):
 
     def __post_init__(self) -> None:
         refuse_other_than_model(self.model)
-        refuse_ball_joints(self.model, "a simulation")
         if not isinstance(self.controller, Unknown | None):
             refuse_other_than_controller("controller", self.controller)
         if isinstance(self.reference, str) or (
@@ -340,7 +338,7 @@ NEITHER = (False, False)
 def _acts(option: str, value: object, model: Model) -> bool:
     """Check whether an option of joints acts: True does not where the description has none."""
     if value is True and option == LIMITS:
-        return bool(np.isfinite(stop_positions(model)).any())
+        return bool(np.isfinite(joint_ranges(model)).any())
     if value is True:
         return bool(getattr(JointDynamicsTerms(model), JOINT_TERMS[option]).any())
     return value is not False
