@@ -9,7 +9,6 @@ import numpy as np
 
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.spatial.scalar import Floats
 
 FULL_TURN = 2.0 * math.pi
@@ -27,38 +26,52 @@ class FrameCoordinates:
     """The coordinates of the model that move one of the frames, as variables of the solver.
 
     Their values are a list of floats: first the six of a floating base, if there is one, as the body twist
-    that reaches its pose from the current one in unit time; then those of the joints between root and frames,
-    in the order of q. Angles whose range is a full
-    turn have infinite bounds here; after the search they are shifted by full turns into their limits, as near
-    as possible to the initial configuration. Coordinates of other branches of the tree never change.
+    that reaches its pose from the current one in unit time; then three of each ball joint between root and
+    frames, the rotation vector that reaches its attitude from the current one; then those of the other joints
+    there, in the order of q. Angles whose range is a full turn have infinite bounds here; after the search
+    they are shifted by full turns into their limits, as near as possible to the initial configuration. A ball
+    joint is turned back to its largest angle after each step. Coordinates of other branches of the tree never
+    change.
     """
 
     def __init__(self, model: Model, frames: str | Sequence[str], margin: Floats | None = None) -> None:
         """`margin` (nq,) [rad or m] is the least distance from the position limits.
 
-        Raises ArgumentError if it leaves a joint no range.
+        Raises ArgumentError if it leaves a joint no range, UnsupportedFeatureError for a margin of a robot
+        with ball joints.
         """
-        refuse_ball_joints(model, "inverse kinematics")
+        if margin is not None and model.ball_joints:
+            from dynx.model.ball_joints import refuse_ball_joints  # most robots have none
+
+            refuse_ball_joints(model, "limit_margin of inverse kinematics")
         self._model = model
         self.floating = model.floating
         """Whether the first six coordinates are those of a floating base."""
         self._base = 7 if model.floating else 0
         names = [frames] if isinstance(frames, str) else frames
-        joints = sorted({k for frame in names for k in _joints_on_path(model, frame)})
-        self.indices = [self._base + k for k in joints]
-        """Indices in q of the joints' coordinates."""
+        moving = sorted({k for frame in names for k in _joints_on_path(model, frame)})
+        kinds = [model.coordinate_joints[k] for k in moving]
+        self.balls = [joint for joint in kinds if joint.type == "ball"]
+        """Ball joints among the joints."""
+        kinds = [joint for joint in kinds if joint.type != "ball"]
+        self.indices = [model.position_index(joint.name) for joint in kinds]
+        """Indices in q of the joints with one coordinate."""
         self._in_q = _as_slice(self.indices)
         offset = 6 if model.floating else 0
-        self.columns: Columns = _as_slice([*range(offset), *(offset + k for k in joints)])
+        in_v = [model.coordinate_index(joint.name) for joint in kinds]
+        turning = [model.coordinate_index(joint.name) + k for joint in self.balls for k in range(3)]
+        self._turning = [*range(offset), *turning]
+        self.columns: Columns = _as_slice([*self._turning, *in_v])
         """The columns of the Jacobian, in the order of the coordinates."""
-        self.count = offset + len(joints)
+        self.count = len(self._turning) + len(in_v)
         """Number of coordinates; 0 if nothing moves the frame."""
+        self.relative = bool(self._turning)
+        """Whether some coordinates count from the current configuration: those of quaternions."""
 
         self._low, self._high = model.lower[self._in_q], model.upper[self._in_q]
         if margin is not None:
             self._low, self._high = _reduced_range(model, self.indices, margin)
         drivers = {joint.mimic.joint for joint in model.joints if joint.mimic is not None}
-        kinds = [model.coordinate_joints[k] for k in joints]
         # A joint that drives mimic joints is not periodic, because those keep moving.
         rotates = np.array([j.type != "prismatic" and j.name not in drivers for j in kinds], dtype=bool)
         full_range = self._high - self._low >= FULL_TURN - _FULL_TURN_TOLERANCE
@@ -68,9 +81,9 @@ class FrameCoordinates:
         lower, upper = self._low.tolist(), self._high.tolist()
         for k in self.periodic:
             lower[k], upper[k] = -math.inf, math.inf
-        self.lower: list[float] = [-math.inf] * offset + lower
+        self.lower: list[float] = [-math.inf] * len(self._turning) + lower
         """Lower bounds of the search."""
-        self.upper: list[float] = [math.inf] * offset + upper
+        self.upper: list[float] = [math.inf] * len(self._turning) + upper
         """Upper bounds of the search."""
         limited = np.isfinite(self._low) & np.isfinite(self._high)
         self._span = self._high - self._low if limited.all() else None
@@ -88,24 +101,26 @@ class FrameCoordinates:
 
     def clipped(self, q: Floats) -> Floats:
         """Return configurations (..., nq) with these joints moved into their limits."""
-        q = np.array(q)
+        q = self._model.clip(q) if self.balls else np.array(q)
         q[..., self._in_q] = np.clip(q[..., self._in_q], self._low, self._high)
         return q
 
     def values(self, q: Floats) -> list[float]:
         """Return the coordinates at configuration q (nq,)."""
         joints: list[float] = q.tolist() if self.is_all else q[self._in_q].tolist()
-        return [0.0] * 6 + joints if self._base else joints
+        return [0.0] * len(self._turning) + joints
 
     def with_values(self, q: Floats, to: list[float]) -> Floats:
         """Return the configuration q (nq,) with these coordinates set to `to`."""
         if self.is_all:
             return np.array(to)
-        if self._base:
-            v = np.zeros(self._model.nv)
-            v[:6] = to[:6]
+        if self.relative:
+            v, n = np.zeros(self._model.nv), len(self._turning)
+            v[self._turning] = to[:n]
             q = self._model.integrate(q, v)
-            to = to[6:]
+            if self.balls:
+                q = self._model.clip(q)
+            to = to[n:]
         changed: Floats = q.copy()
         changed[self._in_q] = to
         return changed
@@ -117,8 +132,8 @@ class FrameCoordinates:
         """
         if frame is None:
             return frozenset()
-        base = 7 if self._model.floating else 0
-        moved = {base + k for k in _joints_on_path(self._model, frame)} & set(self.indices)
+        names = [self._model.joint_names[k] for k in _joints_on_path(self._model, frame)]
+        moved = {self._model.position_index(name) for name in names} & set(self.indices)
         return frozenset(moved | {-1}) if self.floating else frozenset(moved)
 
     @property
@@ -142,6 +157,8 @@ class FrameCoordinates:
         A joint without limits is drawn from within pi [rad] or 1 m of its value in q0.
         """
         drawn: Floats = q0.copy()
+        if self.balls:
+            drawn = self.with_balls_of(drawn, self._model.random(rng))
         if self._span is not None:
             drawn[self._in_q] = self._low + self._span * rng.random(len(self._low))
             return drawn
@@ -150,6 +167,21 @@ class FrameCoordinates:
         high = np.where(np.isfinite(self._high), self._high, np.maximum(current, self._low) + default)
         drawn[self._in_q] = low + (high - low) * rng.random(len(low))
         return drawn
+
+    def with_balls_of(self, q: Floats, other: Floats) -> Floats:
+        """Return configurations q (..., nq) with the attitudes of these ball joints in `other`."""
+        changed: Floats = q.copy()
+        for joint in self.balls:
+            k = self._model.position_index(joint.name)
+            changed[..., k : k + 4] = other[..., k : k + 4]
+        return changed
+
+    def rotations(self, a: Floats, b: Floats) -> Floats:
+        """Return the rotation vectors (n,) [rad] by which ball joints turn from configuration a to b (nq,),
+        three for each."""
+        if not self.balls:
+            return np.zeros(0)
+        return self._model.difference(a, b)[self._turning[6 if self.floating else 0 :]]
 
     def starts(self, rng: np.random.Generator, count: int) -> Floats:
         """Return values of the joints (count, n_joints), drawn uniformly within their limits.

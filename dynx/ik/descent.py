@@ -126,25 +126,25 @@ def _run_part(
     q: Floats,
     time_limit: TimeLimit,
 ) -> tuple[Floats | None, int]:
-    """Descend in some coordinates of q; return the best configuration of a floating robot, and the number of
-    the last state."""
-    n, columns, floating, now = coordinates.count, coordinates.columns, coordinates.floating, 0
+    """Descend in some coordinates of q; return the best configuration if some are relative, and the number
+    of the last state."""
+    n, columns, relative, now = coordinates.count, coordinates.columns, coordinates.relative, 0
     best, least = q, np.inf
     while True:
         space.pose[...] = backend.forward_kinematics(q, frame)
         space.jacobian[...] = backend.jacobian(q, frame)[:, columns]
         space.runs[now]()
         now = 1 - now
-        if floating:
-            # The coordinates of the base count from where it is, so that the best configuration is kept here.
+        if relative:
+            # Relative coordinates count from where q is, so that the best configuration is kept here.
             after = space.memories[now][n + descent.least]
             if after < least or space.memories[now][n + 2]:
                 best, least = q, after
         if space.status[0] != RUNNING or time_limit.is_over():
-            return best if floating else None, now
-        start = best if floating and descent is not SEARCH else q
+            return best if relative else None, now
+        start = best if relative and descent is not SEARCH else q
         q = coordinates.with_values(start, space.xs[now].tolist())
-        if floating:
+        if relative:
             space.xs[now][...] = coordinates.values(q)
 
 

@@ -421,9 +421,9 @@ SolverKey = tuple[str, TargetKind, bytes]
 
 def kernel_applies(backend: Backend, problem: Problem) -> bool:
     """Check whether a kernel solves a problem: on a backend that compiles, for one frame that 1 to
-    `MAX_COORDINATES` joints move, on a fixed base."""
+    `MAX_COORDINATES` joints move, on a fixed base without ball joints."""
     coordinates = problem.coordinates
-    if not backend.compiles or coordinates.floating or len(problem.requirements) > 1:
+    if not backend.compiles or backend.model.quaternions or len(problem.requirements) > 1:
         return False
     return 0 < coordinates.count <= MAX_COORDINATES and problem.limits.max_restarts <= MAX_RESTARTS
 

@@ -257,6 +257,10 @@ def checked_problem(
         raise ShapeError(
             f"leading axes do not broadcast: target has {of_targets}, q0 has {start.shape[:-1]}"
         ) from None
+    if model.ball_joints and (secondary is not None or options.avoid is not None):
+        from dynx.model.ball_joints import refuse_ball_joints  # most robots have none
+
+        refuse_ball_joints(model, "inverse kinematics with nearest, maximize or avoid")
     avoidance = checked_avoidance(model, options.avoid)
     if avoidance is not None and options.method != "dynx":
         raise ArgumentError("avoid needs method 'dynx'")
@@ -369,6 +373,8 @@ def checked_velocity_limit(name: str, bound: ArrayLike, model: Model) -> Floats:
 def start_within_limits(model: Model, q0: ArrayLike | None) -> Floats:
     """Return q0, or the neutral configuration, moved into the limits and with a unit quaternion."""
     q = model.neutral() if q0 is None else checked_q(model, q0, "q0")
+    if model.ball_joints:
+        return model.clip(q)
     q = np.minimum(np.maximum(q, model.lower), model.upper)
     if model.floating:
         q[..., 3:7] /= np.linalg.norm(q[..., 3:7], axis=-1, keepdims=True)
@@ -394,7 +400,7 @@ def start_note(model: Model, q0: ArrayLike) -> str:
     outside = (q < model.lower) | (q > model.upper)
     if not outside.any():
         return ""
-    offset, names = model.nq - len(model.joint_names), model.joint_names
+    offset, names = 7 if model.floating else 0, model.position_names
     if q.ndim > 1:
         columns = np.flatnonzero(outside.any(axis=tuple(range(q.ndim - 1))))
         joints = ", ".join(names[k - offset] for k in columns.tolist())

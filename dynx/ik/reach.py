@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.ik.problem import Problem, Requirement
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.mechanism import joint_motion
 from dynx.model.model import Model
 from dynx.rbd.kinematics import ancestry
@@ -98,10 +97,13 @@ def _position_slack(requirement: Requirement) -> float:
     return math.hypot(*axes.position_tolerances)
 
 
+ZERO = np.zeros(())
+"""Position of a joint."""
+
+
 @lru_cache(maxsize=64)
 def frame_reach(model: Model, frame: str, point: tuple[float, float, float]) -> MaxReach:
     """Return the reach of a point (3,) [m] of a frame, in its axes, of a model with a fixed base."""
-    refuse_ball_joints(model, "inverse kinematics")
     mechanism = model.mechanism
     placed = mechanism.frames[model.frame_index(frame)]
     R, p = np.eye(3), np.zeros(3)
@@ -112,7 +114,10 @@ def frame_reach(model: Model, frame: str, point: tuple[float, float, float]) -> 
     slides: list[list[_Slide]] = [[]]
     for index in reversed(ancestry(mechanism, placed.body)):
         body = mechanism.bodies[index]
-        axis = rotate(R @ body.R, body.axis)
+        if body.ball:
+            # The first of the three bodies of a ball joint stands for it: its point is the centre.
+            continue
+        axis = np.zeros(3) if body.ball == 0 else rotate(R @ body.R, body.axis)
         if body.revolute:
             joints.append(body.joint)
             axes.append(axis)
@@ -120,7 +125,7 @@ def frame_reach(model: Model, frame: str, point: tuple[float, float, float]) -> 
             slides.append([])
         else:
             slides[-1].append((axis, *_travel(model, body.joint)))
-        R_joint, p_joint = joint_motion(body, np.asarray(0.0))
+        R_joint, p_joint = joint_motion(body, np.array([0.0, 0.0, 0.0, 1.0]) if body.ball == 0 else ZERO)
         R, p = R @ R_joint, p + rotate(R, p_joint)
     end = p + rotate(R, placed.p) + R @ placed.R @ np.array(point)
     if not joints:
@@ -134,7 +139,7 @@ def frame_reach(model: Model, frame: str, point: tuple[float, float, float]) -> 
 def _travel(model: Model, name: str) -> tuple[float, float]:
     """Return the position limits of a joint; of a mimic joint those that follow from its driver."""
     mimic = model.joint(name).mimic
-    at = model.joint_names.index(name if mimic is None else mimic.joint)
+    at = model.position_index(name if mimic is None else mimic.joint)
     low, high = float(model.lower[at]), float(model.upper[at])
     if mimic is None:
         return low, high

@@ -16,7 +16,6 @@ from dynx.ik.problem import SOLVERS, Problem, argument_note, checked_problem
 from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Search
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.numbers import checked_bool
 from dynx.time_limit import not_counted
 
@@ -114,7 +113,6 @@ def inverse_kinematics(
             "as dynx.backend(NAME, model) returns it"
         ) from None
     if not compiles:
-        refuse_ball_joints(backend.model, "inverse kinematics")
         return _inverse_kinematics(backend, target, frame, q0, options)
     # A few microseconds for a single pose with options that were checked before.
     solvers = backend.kept(SOLVERS, _kernel_solvers)

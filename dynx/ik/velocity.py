@@ -119,12 +119,14 @@ def velocity_bounds(
     limits returns as fast as these bounds allow, and arrives at the limit. Where bounds contradict each
     other, those of position and velocity count more than that of the change. Arguments are not checked.
     """
-    offset = 6 if model.floating else 0
     room_below, room_above = np.full(model.nv, np.inf), np.full(model.nv, np.inf)
-    joints = q[7:] if model.floating else q
-    lower, upper = (model.lower[7:], model.upper[7:]) if model.floating else (model.lower, model.upper)
-    room_below[offset:] = joints - lower
-    room_above[offset:] = upper - joints
+    ones = [joint.name for joint in model.coordinate_joints if joint.type != "ball"]
+    in_q, in_v = (
+        [model.position_index(each) for each in ones],
+        [model.coordinate_index(each) for each in ones],
+    )
+    room_below[in_v] = q[in_q] - model.lower[in_q]
+    room_above[in_v] = model.upper[in_q] - q[in_q]
     # The room is negative outside a limit, and so is the velocity towards it.
     low = -_towards(room_below, dt, velocity_limit, acceleration_limit)
     high = _towards(room_above, dt, velocity_limit, acceleration_limit)
@@ -137,9 +139,9 @@ def velocity_bounds(
 def joints_outside(model: Model, q: Floats) -> str:
     """Return a sentence that names the joints whose position q is outside the limits, or an empty text."""
     beyond = np.maximum(model.lower - q, q - model.upper)
-    offset = model.nq - len(model.joint_names)
+    offset = 7 if model.floating else 0
     names = [
-        f"{model.joint_names[k - offset]} by {beyond[k]:.6g}"
+        f"{model.position_names[k - offset]} by {beyond[k]:.6g}"
         for k in np.flatnonzero(beyond > OUTSIDE).tolist()
     ]
     return f"q is outside the position limits [rad or m]: {', '.join(names)}" if names else ""
@@ -466,7 +468,8 @@ def velocity_ik(
     DTypeError, NotFiniteError) for an invalid argument.
     """
     model = backend.model
-    refuse_ball_joints(model, "inverse kinematics")
+    if any(joint.limits.upper < math.pi for joint in model.ball_joints):
+        refuse_ball_joints(model, "velocity_ik, as long as it has a largest angle,")
     seconds, time_limit = positive_seconds("dt", dt), TimeLimit(timeout)
     position = checked_q(model, q, "q")
     if position.ndim != 1:
@@ -501,7 +504,7 @@ def velocity_ik(
             raise ShapeError(f"posture has shape {goal.shape}; wanted ({model.nq},)")
         offset = 6 if model.floating else 0
         select = np.eye(model.nv)[offset:]
-        error = (goal - position)[7 if model.floating else 0 :]
+        error = model.difference(position, goal)[offset:]
         soft.append((posture_weight * select, posture_weight * posture_gain * error))
     programme = Programme(soft, hard, damping, lower, upper)
     avoidance = checked_avoidance(model, avoid)

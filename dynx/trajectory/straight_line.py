@@ -18,6 +18,7 @@ from dynx.argument_types import checks_types
 from dynx.backends import Backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError, shown
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.configuration import checked_q
 from dynx.model.elements import matrix_of_pair
 from dynx.model.numbers import real_array
@@ -148,6 +149,7 @@ class _StraightLine:
     ) -> None:
         if model.floating:
             raise ArgumentError(f"{model.name} has a floating base; a line needs a fixed one")
+        refuse_ball_joints(model, "a straight line")
         if isinstance(engine, Backend) and engine.model != model:
             raise ArgumentError(f"backend is one of {engine.model.name}, not of this model")
         model.frame_index(frame)

@@ -86,10 +86,6 @@ def reach(robot: str) -> object:
     return make_environment("dynx/Reach-v0", robot=robot)
 
 
-def tracked(frames: int = 3) -> object:
-    return engine().track(np.repeat(pose()[None], frames, axis=0), "hand")
-
-
 def velocity_ik() -> object:
     from dynx.ik.velocity import VelocityTask
 
@@ -99,12 +95,13 @@ def velocity_ik() -> object:
 REFUSED: dict[str, Callable[[Path], object]] = {
     "to_urdf": lambda folder: MODEL.to_urdf(),
     "to_urdf with shapes": lambda folder: MODEL.to_urdf(geometry=True),
-    "inverse_kinematics": lambda folder: engine().inverse_kinematics(pose(), "hand", Q),
-    "inverse_kinematics of a position": lambda folder: engine().inverse_kinematics(np.zeros(3), "hand"),
     "all solutions": lambda folder: engine().inverse_kinematics(pose(), "hand", all_solutions=True),
     "closed_form": lambda folder: dynx.ik.closed_form(MODEL, "hand"),
-    "track": lambda folder: tracked(),
-    "velocity_ik": lambda folder: velocity_ik(),
+    "velocity_ik with limits": lambda folder: velocity_ik(),
+    "inverse_kinematics with nearest": lambda folder: engine().inverse_kinematics(pose(), "hand", nearest=Q),
+    "inverse_kinematics with a margin": lambda folder: engine().inverse_kinematics(
+        pose(), "hand", limit_margin=0.1
+    ),
     "line": lambda folder: trajectory.line(MODEL, "hand", Q, np.zeros(3), 1.0, backend="reference"),
     "time_optimal": lambda folder: trajectory.time_optimal(
         Q, MODEL.neutral(), acceleration=1.0, jerk=1.0, model=MODEL
@@ -143,11 +140,11 @@ COMMANDS_THAT_COMPUTE = (
     ("convert", "ROBOT", "--to", "sdf"),
     ("agree", "ROBOT", "--backends", "reference,compiled"),
     ("sim", "ROBOT", "--duration", "0.1"),
+    ("ik", "ROBOT", "--target", "0,0,0.4", "--frame", "hand"),
 )
 COMMANDS_THAT_REFUSE = (
     ("id", "ROBOT", "--v", "shoulder=1"),
     ("convert", "ROBOT", "--to", "urdf"),
-    ("ik", "ROBOT", "--target", "0,0,0.3"),
     ("doctor", "ROBOT"),
     ("same", "ROBOT", "ROBOT"),
     ("view", "ROBOT"),

@@ -66,7 +66,7 @@ FLOWS = {
         ("world", "sim", "ik.closed_forms"),
         (),
         105,
-        18800,
+        19010,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -89,7 +89,7 @@ FLOWS = {
         ),
         (),
         152,
-        25100,
+        25400,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
@@ -107,7 +107,7 @@ FLOWS = {
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
         154,
-        26900,
+        27260,
     ),
 }
 

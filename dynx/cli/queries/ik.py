@@ -91,7 +91,8 @@ def ik(
         if kept is not None:
             result["avoid"] = avoid
             result["collision"] = "" if found.collision is None else str(found.collision)
-        joints = dict(zip(model.joint_names, result["q"][model.nq - len(model.joint_names) :], strict=True))
+        names = model.position_names
+        joints = dict(zip(names, result["q"][model.nq - len(names) :], strict=True))
     code = DONE if result["success"] else NEGATIVE_RESULT
     if write_json(result, json_path):
         return code

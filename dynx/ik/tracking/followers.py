@@ -133,7 +133,15 @@ class SampleFollower:
             return Descended(q, error.position, error.rotation, error.reached, 0)
         lower, upper = bounds.around(np.array(coordinates.values(q)))
         settings = tracking_settings(limits, abandons=abandons)
-        return task.descend(TRACKING, q, settings, (lower.tolist(), upper.tolist()))
+        found = task.descend(TRACKING, q, settings, (lower.tolist(), upper.tolist()))
+        if coordinates.balls:
+            turned = np.abs(coordinates.rotations(q, found.q))
+            first = 6 if coordinates.floating else 0
+            if (turned > bounds.reach[first : first + len(turned)]).any():
+                # The bounds hold for each step of a descent, not for all of them together.
+                error = task.error(q)
+                return Descended(q, error.position, error.rotation, False, found.steps)
+        return found
 
 
 def _followed(found: list[Descended], nq: int) -> Followed:
@@ -214,9 +222,9 @@ def path_follower(
     point: Floats | None,
     limits: SearchLimits,
 ) -> KernelFollower | None:
-    """Return a follower of targets of this kind; None for a floating base, a frame that no joint or more than
-    `MAX_COORDINATES` joints move, or a backend that compiles nothing."""
-    if not backend.compiles or coordinates.floating or not 0 < coordinates.count <= MAX_COORDINATES:
+    """Return a follower of targets of this kind; None for a floating base or ball joints, a frame that no
+    joint or more than `MAX_COORDINATES` joints move, or a backend that compiles nothing."""
+    if not backend.compiles or backend.model.quaternions or not 0 < coordinates.count <= MAX_COORDINATES:
         return None
     kind = TargetKind(targets.positions is not None, targets.rotations is not None, point is not None)
 

@@ -244,6 +244,9 @@ class PathTracker:
         """Return configurations (k, nq) that reach a target (1,), each once; other joints are those of q."""
         starts = np.tile(q, (len(self._starts) + 1, 1))
         starts[1:, self.coordinates.indices] = self._starts
+        if self.coordinates.balls:
+            drawn = self._backend.model.random(0, len(self._starts))
+            starts[1:] = self.coordinates.with_balls_of(starts[1:], drawn)
         copies = target[np.zeros(len(starts), dtype=np.intp)]
         found = self._follower.descend(starts, copies, self._limits.unbounded_steps)
         within: list[Floats] = []
@@ -318,8 +321,8 @@ class PathTracker:
 
     def _distance(self, a: Floats, b: Floats) -> float:
         """Return the largest difference of a joint [rad or m]."""
-        indices = self.coordinates.indices
-        return float(np.max(np.abs(a[indices] - b[indices]), initial=0.0))
+        indices, turned = self.coordinates.indices, self.coordinates.rotations(a, b)
+        return float(np.max(np.abs([*(a[indices] - b[indices]), *turned]), initial=0.0))
 
     def _is_within_limits(self, q: Floats) -> bool:
         x = np.array(self.coordinates.values(q))

@@ -91,12 +91,12 @@ class FailureExplainer:
         x = np.array(coordinates.values(q))
         at_position = (x <= limits.lower + AT_BOUND) | (x >= limits.upper - AT_BOUND)
         joint_offset = len(x) - len(coordinates.indices)
-        base = model.nq - len(model.joint_names)
+        base = 7 if model.floating else 0
         position: list[str] = []
         velocity: list[str] = []
         for number in np.flatnonzero(pressed).tolist():
             index = number - joint_offset
-            name = "the base" if index < 0 else model.joint_names[coordinates.indices[index] - base]
+            name = "the base" if index < 0 else model.position_names[coordinates.indices[index] - base]
             (position if at_position[number] else velocity).append(name)
         found = [
             f"{', '.join(dict.fromkeys(names[:MAX_NAMES]))}{more} at {kind} limit"
@@ -211,8 +211,9 @@ def track(
     invalid argument.
     """
     model = backend.model
-    refuse_ball_joints(model, "inverse kinematics")
     model.frame_index(frame)
+    if model.ball_joints and avoid is not None:
+        refuse_ball_joints(model, "track with avoid")
     seconds = None if dt is None else positive_seconds("dt", dt)
     for name, number in (
         ("position_tolerance", position_tolerance),
@@ -364,5 +365,8 @@ def _limits(
         speed = model.velocity_limit if velocity_limit is None else velocity_limit
         per_sample = checked_velocity_limit("velocity_limit", speed, model)[coordinates.columns] * dt
     steps = np.full(n, float(max_step))
-    steps[:offset] = np.inf
+    first = 6 if coordinates.floating else 0
+    steps[:first] = np.inf
+    if np.isfinite(per_sample[first:offset]).any():
+        refuse_ball_joints(model, "track with velocity limits of its coordinates")
     return TrackLimits(lower, upper, steps, per_sample)
