@@ -123,8 +123,8 @@ def from_function(
     `f` takes one time and returns one configuration (nq,); it is called here and never again, so the
     trajectory can be pickled whatever `f` is. Velocity and acceleration are those of an interpolant that
     equals `f` to 1e-13 of the largest value of each coordinate. If `model` is given, dynx checks the
-    configurations. For a floating base and for ball joints
-    `model` is required, and quaternions must not change their signs.
+    configurations. For a floating base and for ball joints `model` is required, and quaternions must not
+    change their signs.
 
     Raises TrajectoryError, with the time, where `f` is not smooth: join smooth motions by `concatenate`, or
     give velocity and acceleration yourself by a class with `Trajectory.inside`. Raises ShapeError,
