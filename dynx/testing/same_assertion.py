@@ -19,9 +19,9 @@ def assert_same_robot(a: Any, b: Any, *, attributes: Collection[str] = (), **opt
             assert_same_robot("arm.urdf", "arm.xml", attributes=("lower limit", "upper limit"))
 
     `a`, `b` and the options are those of `dynx.same_robot`. `attributes` names kinds of differences that do
-    not change its verdict, but must not occur either: ``"lower limit"``, ``"upper limit"``, ``"velocity
-    limit"``, ``"effort limit"``, ``"damping"``, ``"friction"``, ``"armature"``, ``"stiffness"``, ``"spring
-    reference"``, ``"collision shapes"``, ``"visual shapes"``, ``"contact filter"``, ``"actuator"``,
+    not change its verdict, but must not occur either: ``"lower limit"``, ``"upper limit"``,
+    ``"velocity limit"``, ``"effort limit"``, ``"damping"``, ``"friction"``, ``"armature"``, ``"stiffness"``,
+    ``"spring reference"``, ``"collision shapes"``, ``"visual shapes"``, ``"contact filter"``, ``"actuator"``,
     ``"sensor"``, ``"frame"``, ``"name"``, ``"gravity"`` or ``"base pose"``. Raises AssertionError with a line
     for each element that differs, UnknownNameError for another kind, and the errors of `dynx.same_robot`.
     """

@@ -642,9 +642,9 @@ class Viewer(Controls):
         return found._replace(words=(*found.words, *written))
 
     def set_shown(self, what: str, visible: bool = True) -> None:
-        """Show or hide the item `what` that the panel lists below "show", such as ``"frames"``, ``"contact
-        forces"``, ``"inertia ellipsoids"`` or ``"collision shapes"``. Raises ArgumentError for what the view
-        does not have."""
+        """Show or hide the item `what` that the panel lists below "show", such as ``"frames"``,
+        ``"contact forces"``, ``"inertia ellipsoids"`` or ``"collision shapes"``. Raises ArgumentError for
+        what the view does not have."""
         self.page.check_open()
         check_switches({"visible": visible})
         switches = self.view.switches
