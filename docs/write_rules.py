@@ -19,11 +19,24 @@ HEAD = """<!-- Written by docs/write_rules.py from the classes in dynx/rules/cat
 
 # Why engines differ on a file
 
-This page lists all causes that `dynx doctor` detects. There are two kinds. A *difference* makes engines
-return different numbers, or makes an engine refuse the file. A *practice* is bad practice or concerns one
-engine, without a measurable difference. Each rule states the engine versions in which the behaviour was
-measured. A test checks these versions against the installed engines. Each rule has a small robot in
-`models/traps` that shows its cause.
+`dynx doctor` checks these rules. Each rule describes one cause for which engines differ on a robot file, or
+one bad practice. Rules have two kinds:
+
+- A *difference* makes an engine return another result, or makes an engine refuse the file.
+- A *practice* is bad practice, or concerns one engine, without a measurable difference.
+
+Each rule names the versions of the engines with which it was measured. Its last line links a small robot
+file that shows the cause. `dynx explain DX101` prints the text of a rule.
+
+Words on this page:
+
+- Two links are *rigidly connected* if all joints between them are fixed.
+- The *principal moments* are the eigenvalues of an inertia tensor. A tensor that *a body can have* has no
+  negative principal moment, and none above the sum of the other two.
+- The *largest double* is 1.7976931348623157e+308. dynx reads a limit of this size as "no limit".
+- A *unit in the last place* is the distance from a number to the next double, about 1e-16 of the number.
+- *Off by 1 %* means an error of 1 % of the largest entry of the right result.
+- A line with `--choose` is an alternative remedy of `dynx doctor --fix`. The first one is the default.
 """
 
 GROUPS = {

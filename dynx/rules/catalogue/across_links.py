@@ -31,26 +31,26 @@ door that weighs a kilogram is not reported."""
 class RobotInMillimetres(Rule):
     """DX520 robot-in-millimetres: The lengths of the robot are in millimetres, where URDF requires metres.
 
-    The evidence is the distance of each joint that moves from the frame of its parent link, where it is not
-    zero. The rule reports a robot if there are two such joints or more and the median is 5 m or more. The
-    robot must also have less than 1e-3 kg per cube of the sum of these distances. Air has 1.2 kg per cubic
-    metre. Without any mass the median must be 20 m or more. In example-robot-data and pybullet_data the
-    largest median is 1.2 m, and the least mass per cube 0.017 kg/m^3.
+    The rule uses the distance of each moving joint from the frame of its parent link, if this distance is not
+    zero. It reports a robot if there are at least two such distances, their median is 5 m or more, and the
+    robot has less than 1e-3 kg per cube of their sum. (Air has 1.2 kg per cubic metre.) If the robot has no
+    mass, the median must be 20 m or more. In example-robot-data and pybullet_data the largest median is 1.2
+    m, and the least mass per cube is 0.017 kg/m^3.
 
-    A robot with a moving joint may have fewer distances, such as a wheel, a gripper or a turntable. The rule
-    then uses three kinds of length: this distance, the distances of centres of mass from their joints, and
-    the diagonals of the shapes of its bodies, meshes included. It reports the robot if there are two lengths
-    or more, and each kind that exists is 5 m or more in the median. The robot must also have less than 1e-5
-    kg per cube of the sum of all lengths. Without any mass the shapes must be 20 m or more. So a mesh alone
-    that lacks its scale is not reported here (DX517 does).
+    A wheel, a gripper or a turntable may have fewer than two such distances. The rule then uses three kinds
+    of length: this distance, the distances of centres of mass from their joints, and the diagonals of the
+    shapes of its bodies, including meshes. It reports the robot if there are at least two lengths, the median
+    of each kind is 5 m or more, and the robot has less than 1e-5 kg per cube of the sum of all lengths. If
+    the robot has no mass, the shapes must be 20 m or more. So this rule does not report a robot in which only
+    a mesh lacks its scale (DX517 does).
 
-    Usual causes: a program that exports the drawing's unit; a file written from a data sheet.
+    Usual causes: a program exported the unit of the drawing, or someone copied lengths from a data sheet.
 
-    All engines use the numbers unchanged, and agree. Poses are a thousand times too large, torques of gravity
-    too, and inertias about the joints a million times.
+    All engines use the numbers unchanged, and agree. Poses and gravity torques are a thousand times too
+    large, and inertias about the joints are a million times too large.
 
-    The file does not say whether tensors, meshes and ranges of sliding joints are in millimetres as well, so
-    no edit removes the cause.
+    The file does not say whether tensors, meshes and ranges of sliding joints are in millimetres, too, so no
+    edit removes the cause.
     """
 
     kind = "practice"
@@ -139,16 +139,16 @@ _LEAST_FACTOR = 1.5
 class InertiaScaledUp(Rule):
     """DX522 inertia-scaled-up: The inertias of several links are one multiple of those of their shapes.
 
-    Simulators with a fixed step are steadier with larger inertias, so tensors of light links are multiplied
-    by 10 or 100, or masses are reduced and tensors are not. The evidence: where a link has a box or a
-    cylinder, its three principal moments are compared with those of the solid of uniform density and of the
-    link's mass. Reported are links whose three ratios are equal to 2 %, at 1.5 or more, where another link
-    with a shape of other sides has the same ratio. A shape that is merely drawn too small, or hollow, has
-    three different ratios. Spheres and cubes, which have one ratio whatever their size, are no evidence.
-    Nothing is reported in example-robot-data and pybullet_data.
+    Simulations with a fixed time step are more stable with larger inertias. So some authors multiply the
+    tensors of light links by 10 or 100, or reduce masses without changing the tensors. The rule finds this in
+    links with a box or a cylinder. It divides the three principal moments of the link by those of the solid
+    shape with uniform density and the link's mass. It reports the link if the three ratios are equal to 2 %,
+    are 1.5 or more, and another link with a different shape has the same ratio. A shape that is drawn too
+    small, or a hollow part, has three different ratios. Spheres and cubes are left out, because their ratios
+    are always equal. The rule reports nothing in example-robot-data and pybullet_data.
 
-    All engines use the numbers unchanged. Accelerations and frequencies of the robot are lower than they are,
-    and gains that were tuned on it too large.
+    All engines use the numbers unchanged. Accelerations and frequencies are lower than those of the real
+    robot, and gains that were tuned with this model are too large.
 
     The file does not say whether the tensors or the masses were changed, so no edit removes the cause.
     """

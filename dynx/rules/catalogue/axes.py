@@ -39,16 +39,16 @@ class AxisNotUnit(EditingRule):
     """DX201 axis-not-unit: The axis of a joint is not a unit vector.
 
     URDF says that ``<axis xyz="..."/>`` should have length 1. A wrong length does not change the direction,
-    and most readers normalise the axis. Typical are axes such as ``0 0 -2`` or ``1 1 0``, and axes that were
-    rounded to six digits, ``0.577350 0.577350 0.577350``, whose length is off by 1e-6.
+    and most readers normalise the axis. Examples are ``0 0 -2``, ``1 1 0``, and ``0.577350 0.577350
+    0.577350``, which was rounded to six digits, so that its length is off by 1e-6.
 
-    - PyBullet 3.2.7 keeps the length. A prismatic joint then moves by length times its coordinate, and the
-      positions of all links behind it are wrong in proportion. The simulation (``stepSimulation``) uses the
-      long axis for every type of joint: accelerations are wrong in proportion. ``calculateInverseDynamics``,
-      ``calculateMassMatrix`` and ``calculateJacobian`` scale it to 1, with a warning on stdout, so PyBullet
-      contradicts itself.
-    - Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 scale it to 1. So does dynx.
-    - An axis shorter than about 1e-6 counts as zero in MuJoCo and Drake, which refuse the file.
+    - PyBullet 3.2.7 keeps the length. A prismatic joint then moves by length times its coordinate, so the
+      positions of all links beyond it are wrong. The simulation (``stepSimulation``) uses the axis with this
+      length for every type of joint, so accelerations are wrong, too. ``calculateInverseDynamics``,
+      ``calculateMassMatrix`` and ``calculateJacobian`` scale the axis to length 1, with a warning on stdout.
+      So PyBullet contradicts itself.
+    - Pinocchio 4.1, MuJoCo 4.0, Drake 1.51 and dynx scale the axis to length 1.
+    - MuJoCo and Drake read an axis shorter than about 1e-6 as zero, and refuse the file.
 
     The effect is the deviation of the length from 1: 1e-7 for a rounded axis, 1 for an axis of length 2.
 
@@ -80,21 +80,21 @@ _COORDINATES = frozenset("xyz")
 class AxisWithoutDirection(EditingRule):
     """DX202 axis-without-direction: The axis of a joint that moves is zero or empty.
 
-    ``<axis xyz="0 0 0"/>`` and ``<axis/>`` define no direction of motion. Exporters write the first for fixed
-    joints, where it is ignored. Once the type is changed to ``revolute`` it matters. A joint without any
-    ``<axis>`` is fine: URDF's default (1, 0, 0) is used by all engines alike. A direction in an attribute
-    that is not ``xyz`` is DX218.
+    ``<axis xyz="0 0 0"/>`` and ``<axis/>`` define no direction of motion. Exporters write the first form for
+    fixed joints, where readers ignore it. If someone changes the type to ``revolute``, the axis matters. A
+    joint without any ``<axis>`` is fine: all engines use URDF's default (1, 0, 0). A direction in another
+    attribute than ``xyz`` is DX218.
 
     - Pinocchio 4.1 loads it. The joint has a coordinate that moves nothing: its row and column of the mass
       matrix are zero, and forward dynamics gives NaN.
-    - PyBullet 3.2.7 loads it. With the zero axis, positions behind the joint are NaN, inverse dynamics and
-      mass matrix fail. For ``<axis/>`` the axis is whatever its memory held, another at each load: the result
-      is undefined. Reports say "not used" there, not "refused".
+    - PyBullet 3.2.7 loads it. With the zero axis, positions beyond the joint are NaN, and inverse dynamics
+      and mass matrix fail. For ``<axis/>`` PyBullet reads uninitialised memory, so the axis is random. The
+      doctor then does not use PyBullet, and reports say "not used".
     - MuJoCo 4.0 refuses the file.
     - Drake 1.51 refuses the zero axis, and reads ``<axis/>`` as (1, 0, 0).
 
-    What to do: write the direction. ``<axis x="0" y="0" z="1"/>`` contains it, and ``dynx doctor --fix``
-    writes ``xyz="0 0 1"``. Otherwise the file does not contain it, so ``dynx doctor --fix`` writes URDF's
+    What to do: write the direction. For ``<axis x="0" y="0" z="1"/>``, ``dynx doctor --fix`` writes ``xyz="0
+    0 1"``. In other cases the file does not contain the direction, and ``dynx doctor --fix`` writes URDF's
     default, (1, 0, 0). If the joint should not move, ``--choose DX202=fixed`` makes it a fixed joint.
     """
 
@@ -145,20 +145,20 @@ def _direction_in_parts(axis: SourceElement) -> str | None:
 class AxisAttributeMisspelled(EditingRule):
     """DX218 axis-attribute-misspelled: The direction of an axis stands in an attribute that is not ``xyz``.
 
-    ``<axis xzy="0 0 1"/>``, ``<axis XYZ="0 0 1"/>`` or ``<axis rpy="0 0 1"/>``: the numbers are there, and no
-    engine looks for them under that name.
+    Examples are ``<axis xzy="0 0 1"/>``, ``<axis XYZ="0 0 1"/>`` and ``<axis rpy="0 0 1"/>``. No engine reads
+    the numbers under such a name.
 
-    - Pinocchio 4.1 loads it with a zero axis. The joint has a coordinate that moves nothing: its row and
-      column of the mass matrix are zero.
-    - PyBullet 3.2.7 loads it, and the axis is whatever its memory held: zero at first, another at each load
-      of a longer program. dynx does not use such results and reports the file as refused.
+    - Pinocchio 4.1 loads the file with a zero axis. The joint has a coordinate that moves nothing: its row
+      and column of the mass matrix are zero.
+    - PyBullet 3.2.7 loads the file, but reads the axis from uninitialised memory, so the axis is random. The
+      doctor then does not use PyBullet, and reports say "not used".
     - MuJoCo 4.0 refuses the file ("required attribute missing: 'xyz'"), also where the joint is fixed.
     - Drake 1.51 reads (1, 0, 0), URDF's default for a joint without ``<axis>``.
 
-    The other engines ignore the axis of a fixed joint. dynx refuses the axis of a joint that moves, and names
-    the attribute.
+    Of the four engines, only MuJoCo reads the axis of a fixed joint. dynx refuses such an axis of a joint
+    that moves, and names the attribute.
 
-    What to do: correct the name. ``dynx doctor --fix`` does so where the attribute holds three numbers that
+    What to do: correct the name. ``dynx doctor --fix`` corrects it if the attribute holds three numbers that
     are not all zero. An axis without any numbers is DX202, or DX219 on a fixed joint.
     """
 
@@ -182,16 +182,16 @@ class AxisAttributeMisspelled(EditingRule):
 class UnreadableAxisOfFixedJoint(EditingRule):
     """DX219 unreadable-axis-of-fixed-joint: The axis of a joint that does not turn is not three numbers.
 
-    A fixed joint has no use for ``<axis>``, and exporters write ``<axis/>``, ``<axis xyz=""/>`` or what is
-    left of a template. A floating joint has none either.
+    A fixed or floating joint has no axis. But exporters write ``<axis/>``, ``<axis xyz=""/>`` or the remains
+    of a template.
 
     - MuJoCo 4.0 reads the axis of every joint and refuses the file ("required attribute missing: 'xyz'", "bad
       format in attribute 'xyz'").
-    - Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 ignore it. So does dynx.
+    - Pinocchio 4.1, PyBullet 3.2.7, Drake 1.51 and dynx ignore the axis.
 
-    A direction under another name, ``<axis xzy="0 0 1"/>``, is DX218.
+    A direction under another name, such as ``<axis xzy="0 0 1"/>``, is DX218.
 
-    What to do: remove the ``<axis>``. ``dynx doctor --fix`` does so.
+    What to do: remove the ``<axis>``, as ``dynx doctor --fix`` does.
     """
 
     stage = "reading"
@@ -226,19 +226,19 @@ class AxisNearlyAligned(EditingRule):
     """DX226 axis-nearly-aligned: A joint axis is off a coordinate axis by less than 2e-8 rad, which some
     engines drop.
 
-    CAD programs export axes with noise, such as ``0 1 1.2e-12`` or ``1.6e-10 0 1``. Engines have faster
-    joints for axes along x, y and z, and choose them by comparing the axis with a tolerance.
+    CAD programs export axes with noise, such as ``0 1 1.2e-12`` or ``1.6e-10 0 1``. Some engines have faster
+    code for axes along x, y and z, and use it if the axis is within a tolerance of such a coordinate axis.
 
-    - Drake 1.51.1 takes the coordinate axis if a component of the unit axis rounds to more than 1 - 2.2e-16.
+    - Drake 1.51.1 uses the coordinate axis if a component of the unit axis rounds to more than 1 - 2.2e-16.
       The deviation is then below about 1.8e-8 rad. This applies to revolute, continuous and prismatic joints.
-    - Pinocchio 4.1.0 takes it up to a deviation of 1e-12.
-    - Both compare with the positive directions only: ``1.6e-10 0 -1`` is used as it stands.
-    - PyBullet 3.2.7 and MuJoCo 4.0.0 use all numbers. So does dynx.
+    - Pinocchio 4.1.0 uses the coordinate axis up to a deviation of 1e-12.
+    - Both do this only for positive directions: they use the axis ``1.6e-10 0 -1`` as it is.
+    - PyBullet 3.2.7, MuJoCo 4.0.0 and dynx use all numbers.
 
-    The effect is the angle: poses, and with them torques, are off by up to twice that angle at every joint.
+    The effect: poses and torques are off by up to twice the deviation [rad] at every such joint.
 
-    What to do: write the coordinate axis, which is meant. ``dynx doctor --fix`` writes it, and the report
-    says that the physics changed, by less than 2e-8. ``--choose DX226=keep`` leaves the axis.
+    What to do: write the coordinate axis, which is what the author intended. ``dynx doctor --fix`` writes it,
+    and the report says that the physics changed, by less than 2e-8. ``--choose DX226=keep`` leaves the axis.
     """
 
     engines = measured_on("pinocchio", "drake")

@@ -39,17 +39,17 @@ _ELEMENTS_THAT_OCCUR_ONCE = {
 class RepeatedElement(EditingRule):
     """DX411 repeated-element: An element that is allowed once is repeated.
 
-    It happens when files are merged or templates expanded. Readers that look for the origin of a joint find
-    the first one.
+    For example, a joint has two ``<origin>``. This happens when files are merged or templates are expanded.
 
-    - MuJoCo 4.0 refuses the file: "repeated element", with the line. Collisions and materials count too.
-    - Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 use the first and ignore the others without a warning. So
-      does dynx, with a note.
+    - MuJoCo 4.0 refuses the file: "repeated element", with the line. It also refuses repeated elements in
+      collisions and materials.
+    - Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 use the first element and ignore the others without a
+      warning. dynx does the same, with a note.
 
-    The engines that read the file agree, but an edit of the second of two elements has no effect.
+    The engines that read the file agree. But if you edit the second element, this has no effect.
 
-    What to do: find out which one is right and remove the other. ``dynx doctor --fix`` keeps the first, which
-    the engines use.
+    What to do: find out which element is right, and remove the other. ``dynx doctor --fix`` keeps the first
+    element, which the engines use.
     """
 
     stage = "reading"
@@ -82,21 +82,21 @@ MAX_LINE_BYTES = 8191
 class LineTooLong(EditingRule):
     """DX413 line-too-long: PyBullet cuts a line of more than 8191 bytes, and the cut falls into an element.
 
-    PyBullet 3.2.7 reads a file line by line into 8192 bytes, and puts a line break where a line does not fit.
-    Between elements that has no effect. Inside an element it can: where the cut falls into ``value="2.5"``,
-    PyBullet reads ``value="2<line break>.5"``, and the mass is 2. It prints no warning. Inside the name of an
-    attribute or a tag the file is refused.
+    PyBullet 3.2.7 reads each line into a buffer of 8192 bytes, and inserts a line break into a longer line.
+    Between two elements the line break has no effect. Inside an element it can change a number: for example,
+    PyBullet reads ``value="2<line break>.5"`` instead of ``value="2.5"``, and the mass is 2, without a
+    warning. If the line break is inside the name of an attribute or element, PyBullet refuses the file.
 
-    Files of one long line are written by programs that save white space: minified XML, or the output of
-    serialisers that do not indent.
+    Programs that save white space write such files: minified XML, or the output of serialisers that do not
+    indent.
 
     Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 read lines of any length.
 
-    The effect depends on which byte is the 8191st, so it comes and goes with every edit of the file. It may
-    be a mass off by its decimals, an offset that is zero, or nothing.
+    The effect depends on the position of the line break, so any edit of the file may change it. It may be a
+    mass without its decimals, an offset of zero, or nothing.
 
-    What to do: write one element per line. ``dynx doctor --fix`` breaks such lines in front of each element
-    and changes nothing else.
+    What to do: write one element per line. ``dynx doctor --fix`` inserts a line break before each element of
+    such lines, and changes nothing else.
     """
 
     stage = "reading"
@@ -163,15 +163,15 @@ def _line_breaks(data: bytes, elements: list[SourceElement], line: Span) -> Iter
 class UnknownUrdfVersion(EditingRule):
     """DX416 unknown-urdf-version: The version of the robot is not a version of URDF.
 
-    ``<robot name="..." version="2.0">``: the author counts revisions of the file. In URDF the attribute is
-    the version of the format.
+    An example is ``<robot name="..." version="2.0">``, where the author counts revisions of the file. In URDF
+    the attribute is the version of the format.
 
     - Pinocchio 4.1 refuses a version that is not of the form x.y or not between 1.0 and 1.2.
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore it.
 
-    What to do: remove the attribute, or write ``version="1.0"``. ``dynx doctor --fix`` removes it. Without it
-    a file counts as version 1.0. Where an origin has a quaternion, which URDF has from version 1.1 on, and
-    the version is a later one, it writes ``version="1.2"`` instead.
+    What to do: remove the attribute, or write ``version="1.0"``. ``dynx doctor --fix`` removes the attribute,
+    which means version 1.0. There is one exception: if the version is above 1.2 and an origin has a
+    quaternion, which needs URDF 1.1, it writes ``version="1.2"``.
     """
 
     stage = "reading"
@@ -202,17 +202,18 @@ class LoneCarriageReturn(Rule):
 
     Programs end a line with a line feed (Linux, macOS), or with a carriage return and a line feed (Windows).
     A carriage return alone ended lines on the Macintosh until 2001. Today it comes from conversions of line
-    ends and from pasted text: in a whole file, or in a single place that no editor shows.
+    ends and from pasted text. It may be in a whole file, or in a single place that no editor shows.
 
-    - PyBullet 3.2.7 reads up to the next line feed, at most 8191 bytes, and drops all behind the first
-      carriage return. Where that leaves no well-formed XML, or an element is missing that it requires, it
-      refuses the file ("Cannot load URDF file"). Where whole elements are lost, such as an ``<axis>`` or an
-      ``<origin>``, it loads another robot without a warning.
-    - Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 read a carriage return as a line end, as XML has it. Their
-      errors count line feeds only: each fault of such a file is in line 1. The lines in reports of dynx count
-      both.
+    - PyBullet 3.2.7 reads up to the next line feed, at most 8191 bytes, and drops the text after the first
+      carriage return. If the rest is not well-formed XML, or lacks a required element, it refuses the file
+      ("Cannot load URDF file"). If whole elements are lost, such as an ``<axis>`` or an ``<origin>``, it
+      loads another robot without a warning.
+    - Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 read a carriage return as the end of a line, as XML defines it.
+      But their error messages count line feeds only: if the file has no line feed, every fault is in line 1.
+      Reports of dynx count both.
 
-    A carriage return with nothing but blanks between it and the line feed has no effect and is not reported.
+    If there are only blanks between the carriage return and the line feed, there is no effect, and dynx does
+    not report it.
 
     What to do: save the file with line feeds. ``dynx doctor --fix`` writes a line feed for each such carriage
     return.
@@ -242,14 +243,14 @@ class LoneCarriageReturn(Rule):
 class ProcessingInstruction(EditingRule):
     """DX423 processing-instruction: The file has a processing instruction, which no engine accepts.
 
-    ``<?xml-stylesheet ...?>`` or the mark of an editor, ``<?foo bar?>``, is legal anywhere in XML. tinyxml2,
-    by which all engines parse URDF, knows only declarations, and only at the beginning of the file.
+    A processing instruction, such as ``<?xml-stylesheet ...?>`` or ``<?foo bar?>``, is legal anywhere in XML.
+    All four engines parse URDF with tinyxml2, which accepts such text only at the beginning of the file.
 
-    - Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 refuse the file, unless nothing but
-      declarations precedes it.
-    - dynx reads the file without the instruction, as XML defines it.
+    - Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 refuse the file. They accept an instruction
+      only if nothing but declarations and other instructions precedes it.
+    - dynx ignores the instruction, as XML defines it.
 
-    What to do: remove the instruction. ``dynx doctor --fix`` does so. No engine reads anything in it.
+    What to do: remove the instruction, as ``dynx doctor --fix`` does. No engine uses its content.
     """
 
     stage = "reading"
@@ -296,19 +297,21 @@ _NOT_ASCII_BASED = ("utf-16", "utf-32", "utf-7", "iso-2022", "hz")
 class TextNotUtf8(Rule):
     """DX440 text-not-utf8: The file is not in UTF-8, as which engines read every file.
 
-    Engines ignore the encoding that a file declares. In Latin-1 or the like, characters beyond ASCII become
-    bytes that are no text: without effect in comments, but not in the names of links and joints:
+    Engines read every file as UTF-8, and ignore the encoding that the file declares. In a file in Latin-1 or
+    a similar encoding, characters beyond ASCII are then invalid. In comments this has no effect. In names of
+    links and joints:
 
-    - Pinocchio 4.1 and MuJoCo 4.0 load the file, and raise UnicodeDecodeError when a program reads such a
+    - Pinocchio 4.1 and MuJoCo 4.0 load the file, but raise UnicodeDecodeError when a program reads such a
       name.
-    - Drake 1.51 raises that error when it loads the file.
-    - PyBullet 3.2.7 returns the bytes of such a name, which ``decode()`` refuses.
-    - All refuse a file in UTF-16 or UTF-32.
+    - Drake 1.51 raises this error when it loads the file.
+    - PyBullet 3.2.7 returns the name as bytes, which ``decode()`` refuses.
 
-    dynx reads these files: names by the encoding that is declared, and as Latin-1 where none is declared and
-    the file is not UTF-8.
+    All four engines refuse a file in UTF-16 or UTF-32.
 
-    What to do: save the file in UTF-8. ``dynx doctor --fix`` writes it so, and the declaration too.
+    dynx reads such files in the declared encoding. If the file declares none and is not UTF-8, dynx reads it
+    as Latin-1.
+
+    What to do: save the file in UTF-8. ``dynx doctor --fix`` writes UTF-8, and corrects the declaration.
     """
 
     stage = "reading"
@@ -347,16 +350,15 @@ _KNOWN_CHILDREN = {
 class MisspelledWord(Rule):
     """DX515 misspelled-word: An element or attribute is misspelled, so every reader ignores it.
 
-    URDF readers ignore unknown names, mostly without a warning: with ``<intertial>`` the link has no mass,
-    with ``<limit uper="1">`` the range ends at 0, with ``<dynamics dampng="1">`` there is no damping. The
-    rule reports an unknown name that is close to a known name which is missing, or has its letters in another
-    order (``ryp``). It examines elements of ``<robot>``, ``<link>``, ``<joint>`` and ``<inertial>``, and
-    attributes of elements that matter for dynamics. In an ``<origin>``, ``roll``, ``pitch`` and ``yaw`` stand
-    for ``rpy``, and ``x``, ``y`` and ``z`` for ``xyz``.
+    URDF readers ignore unknown names, mostly without a warning. With ``<intertial>`` the link has no mass,
+    with ``<limit uper="1">`` the range ends at 0, and with ``<dynamics dampng="1">`` there is no damping. The
+    rule reports an unknown name if it is similar to a known name that is missing, or has the letters of this
+    name in another order (``ryp``). It examines elements of ``<robot>``, ``<link>``, ``<joint>`` and
+    ``<inertial>``, and attributes that affect the dynamics. In an ``<origin>`` it also reports ``roll``,
+    ``pitch`` and ``yaw`` in place of ``rpy``, and ``x``, ``y`` and ``z`` in place of ``xyz``. Extensions
+    (``<gazebo>``, ``<sensor>``, names with a prefix) are not similar to known names.
 
-    Extensions (``<gazebo>``, ``<sensor>``, names with a prefix) are not close to any of them.
-
-    All engines ignore the same names. Correcting a name changes the robot, possibly against the author's
+    All engines ignore the same names. A corrected name changes the robot, possibly against the author's
     intention, so no edit removes the cause.
     """
 
@@ -406,18 +408,17 @@ _XACRO_PREFIX = "xacro:"
 class LeftOverXacro(EditingRule):
     """DX531 left-over-xacro: The file has xacro elements, which every engine skips with all that they hold.
 
-    ``<xacro:property>``, ``<xacro:include>`` or the call of a macro is left in a file that was expanded by
-    hand or renamed from ``.xacro`` to ``.urdf``. The program ``xacro`` evaluates such elements. Readers of
-    URDF do not know them. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load the rest without a
-    warning, and so does dynx, with a note. They agree, but links, joints and inertias that a macro would
-    write are not in the robot.
+    The program ``xacro`` evaluates elements such as ``<xacro:property>``, ``<xacro:include>`` and calls of
+    macros. They remain in a file that was expanded by hand, or renamed from ``.xacro`` to ``.urdf``.
+    Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore these elements without a warning, and dynx
+    ignores them with a note. The engines agree, but the robot lacks the links, joints and inertias that a
+    macro would write.
 
-    Expressions such as ``${mass}`` in a number are another matter: no two engines read them alike, and dynx
-    refuses them.
+    For expressions such as ``${mass}`` in a number, see DX420 and DX429.
 
-    What to do: expand the file with ``xacro``, or load the ``.xacro`` file itself. Where nothing is missing,
-    remove the elements: ``dynx doctor --fix`` does so with ``--choose DX531=remove``, and by default leaves
-    them. An attribute ``xmlns:xacro`` of the robot does no harm and is not reported.
+    What to do: expand the file with ``xacro``, or load the ``.xacro`` file itself. If nothing is missing,
+    remove the elements. By default ``dynx doctor --fix`` leaves them. With ``--choose DX531=remove`` it
+    removes them. The rule does not report an attribute ``xmlns:xacro``, which has no effect.
     """
 
     kind = "practice"
@@ -455,17 +456,16 @@ def _outermost_xacro(root: SourceElement) -> Iterator[SourceElement]:
 class MalformedXml(Rule):
     """DX532 malformed-xml: The text is not well-formed XML, which engines forgive and other programs do not.
 
-    All engines parse URDF by tinyxml2, which is lenient. It accepts ``--`` in a comment, ``&`` or ``<`` in a
-    name, attributes without white space between them, and a blank behind ``<``. It also accepts
-    ``<!mesh ...>`` in place of a comment, a malformed or second XML declaration, text in front of the robot
-    and elements behind it. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file without
-    a warning, and read the same robot. Python's XML parsers, xacro and the launch system of ROS refuse it.
+    All four engines parse URDF with tinyxml2, which accepts some faults: ``--`` in a comment, ``&`` or ``<``
+    in a name, attributes without white space between them, and a blank after ``<``. It also accepts ``<!mesh
+    ...>`` in place of a comment, a malformed or second XML declaration, text before ``<robot>`` and elements
+    after it. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file without a warning, and
+    read the same robot. Python's XML parsers, xacro and the launch system of ROS refuse it.
 
-    dynx reads the file as the engines do, with a note. Some faults tinyxml2 refuses, too: an attribute that
-    occurs twice or has no quotes, an element that does not end. dynx refuses these faults with their line.
+    dynx reads the file as the engines do, with a note. tinyxml2 and dynx refuse other faults: an attribute
+    that occurs twice or has no quotes, and an element that does not end. dynx names the line.
 
-    What to do: correct the fault. No remedy of ``dynx doctor`` is needed: each file that it writes is
-    well-formed.
+    What to do: correct the fault. Every file that ``dynx doctor --fix`` writes is well-formed.
     """
 
     stage = "reading"

@@ -23,19 +23,18 @@ class InertiaScaledForContact(EditingRule):
     """DX114 inertia-scaled-for-contact: A link has inertia_scaling, by which PyBullet alone multiplies its
     inertia.
 
-    ``<contact><inertia_scaling value="3.0"/></contact>`` is an extension of PyBullet's, intended to stabilise
-    contacts of light links. Many files that come with PyBullet, and files copied from them, have it.
+    ``<contact><inertia_scaling value="3.0"/></contact>`` is an extension of PyBullet, which makes contacts of
+    light links more stable. Many files that come with PyBullet, and files copied from them, have it.
 
     - PyBullet 3.2.7 multiplies the moments of inertia of the link by the value, also with
-      ``URDF_USE_INERTIA_FROM_FILE``, and in ``calculateInverseDynamics`` and ``calculateMassMatrix`` too. The
-      mass stays.
-    - Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 do not know the tag. Neither does dynx: the value is no
-      property of the robot.
+      ``URDF_USE_INERTIA_FROM_FILE``, and also in ``calculateInverseDynamics`` and ``calculateMassMatrix``.
+      The mass does not change.
+    - Pinocchio 4.1, MuJoCo 4.0, Drake 1.51 and dynx ignore the element.
 
-    The effect is that of a wrong tensor: a few per cent of the mass matrix at a scale of 3, more for light
-    links with reflected inertia.
+    The effect is that of a wrong tensor: a few per cent of the mass matrix at a scale of 3, and more for
+    light links.
 
-    What to do: remove the tag wherever the dynamics matters. ``dynx doctor --fix`` does so and leaves the
+    What to do: remove the element if the dynamics matters. ``dynx doctor --fix`` removes it, and leaves the
     rest of ``<contact>`` in place.
     """
 
@@ -57,28 +56,31 @@ class InertiaFromShapes(CallingRule):
     """DX115 inertia-from-shapes: PyBullet's plain call computes every inertia from collision shapes, not from
     the file.
 
-    ``p.loadURDF(path, useFixedBase=True)`` reads the mass and the origin of an ``<inertial>``, and leaves out
-    its tensor. The moments of inertia are those of a cuboid with the mass of the file: the bounding box of
-    the link's collision shapes along the axes of the inertial.
+    ``p.loadURDF(path, useFixedBase=True)`` reads the mass and the origin of an ``<inertial>``, and ignores
+    its tensor. The moments of inertia are those of a cuboid with the mass in the file. The cuboid is the
+    bounding box of the link's collision shapes, along the axes of the inertial.
 
     Measured with PyBullet 3.2.7:
 
-    - The cuboid is about the centre of mass of the file, wherever the shapes are. Several shapes give one
-      box, round ones their bounding box, a mesh the box about its vertices in its own frame, turned with it.
-      Margins of 1 to 3 mm are added on each side.
+    - The centre of the cuboid is the centre of mass in the file, wherever the shapes are. Several shapes give
+      one box. A mesh counts as the bounding box of its vertices, in the axes of the mesh. PyBullet adds
+      margins of 1 to 3 mm on each side.
     - A link without collision shapes has the inertia of a cuboid of 2 mm, almost zero. A link without
-      ``<inertial>`` has mass 1 and the inertia of its shapes. A text STL counts as no shape.
+      ``<inertial>`` has a mass of 1 kg and the inertia of its shapes. PyBullet reads no shape from an STL
+      file in text form.
     - A link of mass zero has no inertia.
     - With the flag ``URDF_USE_INERTIA_FROM_FILE`` PyBullet reads the tensor, as Pinocchio, MuJoCo and Drake
       do.
 
-    PyBullet loads 65 robots of example-robot-data that have joints. On 64 of them inverse dynamics changes by
-    more than 1e-6 of the largest torque, in the median by 0.8 %. On UR5 it changes by up to 2.8 N m.
+    PyBullet loads 65 robots of example-robot-data that have joints. With the plain call, inverse dynamics of
+    64 of them is off by more than 1e-6 of the largest torque, and the median is 0.8 %. On UR5 the error is up
+    to 2.8 N m.
 
     What to do: write ``p.loadURDF(path, useFixedBase=True, flags=p.URDF_USE_INERTIA_FROM_FILE)``.
 
-    The file is correct, and no file mends the call. ``dynx doctor`` examines the plain call beside the
-    engines, as ``pybullet:plain``. Its difference counts only where ``--engine`` names it.
+    The file is correct, and no change of the file corrects the call. ``dynx doctor`` examines the plain call
+    beside the engines, as the variant ``pybullet:plain``. Its difference counts only if ``--engine`` names
+    the variant.
     """
 
     advice = "Write flags=p.URDF_USE_INERTIA_FROM_FILE in the call of loadURDF."
@@ -110,20 +112,20 @@ class LinksMergedWrongly(CallingRule):
     """DX116 links-merged-wrongly: PyBullet's flag that merges links on fixed joints adds their inertias in
     wrong frames.
 
-    With ``flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_MERGE_FIXED_LINKS``, ``p.loadURDF`` makes one body of
-    links that fixed joints connect, which is faster to step.
+    With ``flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_MERGE_FIXED_LINKS``, ``p.loadURDF`` merges links that
+    fixed joints connect into one body. The simulation is then faster.
 
-    - PyBullet 3.2.7 leaves out the rotation of the fixed joint and those of the inertials, and the centre of
-      mass of the parent. The mass is right: the sum of both.
-    - Pinocchio 4.1, MuJoCo 4.0 (``fusestatic``) and Drake 1.51 merge links rightly.
+    - PyBullet 3.2.7 ignores the rotation of the fixed joint, the rotations of both inertial frames, and the
+      centre of mass of the parent. The mass of the merged body is right.
+    - Pinocchio 4.1, MuJoCo 4.0 (``fusestatic``) and Drake 1.51 merge links correctly.
 
-    On more than 40 of 65 robots of example-robot-data the mass matrix is off, by 0.2 to 54 %. A robot without
-    such links, for example UR5, is loaded as without the flag.
+    On more than 40 of 65 robots of example-robot-data the mass matrix is off by 0.2 to 54 %. For a robot
+    without such links, such as UR5, the flag changes nothing.
 
     What to do: leave the flag out, or merge the links in the file.
 
-    The file is correct, and no file mends the call. ``dynx doctor`` examines this call where ``--engine``
-    names it, as ``pybullet:merge``.
+    The file is correct, and no change of the file corrects the call. ``dynx doctor`` examines this call only
+    if ``--engine`` names the variant ``pybullet:merge``.
     """
 
     advice = "Leave p.URDF_MERGE_FIXED_LINKS out of the call of loadURDF."
@@ -158,21 +160,20 @@ class MujocoSettings(EditingRule):
     """DX224 mujoco-settings: The file has settings of MuJoCo's compiler that change the masses or forces of
     the robot.
 
-    MuJoCo reads an element ``<mujoco>`` in a URDF, which authors add for the folder of the meshes. Other
-    attributes of its ``<compiler>`` change the robot. ``boundmass`` and ``boundinertia`` raise small masses
-    and moments, ``settotalmass`` scales all masses, ``balanceinertia`` and ``inertiafromgeom`` replace
-    tensors. ``autolimits="false"`` makes MuJoCo refuse the limits of a URDF. In ``<option>`` the attributes
-    ``density``, ``viscosity`` and ``wind`` add the drag of a fluid, and ``<flag>`` switches gravity or
-    constraints off.
+    MuJoCo reads an element ``<mujoco>`` in a URDF, usually for the folder of the meshes. But some attributes
+    of its ``<compiler>`` change the robot. ``boundmass`` and ``boundinertia`` raise small masses and moments.
+    ``settotalmass`` scales all masses. ``balanceinertia`` and ``inertiafromgeom`` replace tensors. With
+    ``autolimits="false"`` MuJoCo refuses the limits of a URDF. In ``<option>`` the attributes ``density``,
+    ``viscosity`` and ``wind`` add the drag of a fluid, and ``<flag>`` switches gravity or constraints off.
 
-    - MuJoCo 4.0 obeys them.
-    - Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 ignore ``<mujoco>``. So does dynx.
+    - MuJoCo 4.0 applies these settings.
+    - Pinocchio 4.1, PyBullet 3.2.7, Drake 1.51 and dynx ignore ``<mujoco>``.
 
-    The effect on MuJoCo is of any size: masses scaled to another total scale all torques.
+    The effect in MuJoCo can have any size. For example, ``settotalmass`` scales all torques.
 
-    What to do: state the masses and tensors that you mean, and set options in the program.
-    ``dynx doctor --fix`` removes these attributes and leaves the others, such as ``meshdir`` and
-    ``fusestatic``. ``--choose DX224=keep`` keeps them, and MuJoCo reads another robot.
+    What to do: write the intended masses and tensors into the file, and set options in the program. ``dynx
+    doctor --fix`` removes these attributes and leaves the others, such as ``meshdir`` and ``fusestatic``.
+    ``--choose DX224=keep`` keeps them; MuJoCo then reads another robot.
     """
 
     stage = "reading"

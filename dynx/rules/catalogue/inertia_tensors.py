@@ -49,26 +49,26 @@ class InertiaBrokenByRounding(Rule):
     """DX102 inertia-broken-by-rounding: Principal moments lie on the bound of what a body can have, so
     rounding decides what engines do.
 
-    The principal moments of a rigid body are never negative, and none exceeds the sum of the other two. For
-    thin plates and rods, and for point masses seen from the joint, the two sides are equal. Then the last
-    binary digit decides, and engines round differently. A moment of 0.3 next to 0.1 and 0.2 is fine, while
-    0.13 next to 0.1 and 0.03 is 3e-17 too much.
+    The principal moments of a rigid body are never negative, and none exceeds the sum of the other two. For a
+    thin plate or rod, and for a point mass about the joint, the largest moment equals this sum. Then the last
+    binary digit decides whether an engine accepts the moments, and engines round differently. For example,
+    0.3 does not exceed 0.1 + 0.2 in doubles, but 0.13 exceeds 0.1 + 0.03 by 3e-17.
 
-    - PyBullet 3.2.7 compares to the last bit after its own diagonalisation. Where the test fails it prints
-      "Bad inertia tensor properties" and sets the whole tensor to ZERO. Its inverse dynamics tests once more,
-      about the origin of the link, and refuses the whole robot: inverse dynamics, mass matrix and Jacobian
-      then fail.
+    - PyBullet 3.2.7 tests the moments to the last bit after its own diagonalisation. If the test fails, it
+      prints "Bad inertia tensor properties" and sets the whole tensor to zero. Its inverse dynamics tests the
+      moments again, about the origin of the link. If this test fails, it refuses the whole robot: inverse
+      dynamics, mass matrix and Jacobian fail.
     - MuJoCo 4.0.0 refuses the file ("inertia must satisfy A + B >= C"), in about two of five cases where the
       rpy of the inertial rotates a plate.
-    - Pinocchio 4.1.0 does not look. Drake 1.51.1 has a tolerance of 1e-14.
+    - Pinocchio 4.1.0 has no such test. Drake 1.51.1 has a tolerance of 1e-14.
 
-    The effect: where PyBullet drops the tensor, its mass matrix is off by 1e-6 to 0.9 of its size.
+    The effect: if PyBullet sets the tensor to zero, its mass matrix is off by 1e-6 to 0.9 of its size.
 
-    What to do: the body is correct. Raise the moments by less than anyone can measure.
+    What to do: the tensor is correct. Raise the moments by less than anyone can measure.
 
     ``dynx doctor --fix`` adds the same amount to all three moments: 16 units in the last place of the largest
-    moment about the link's origin. It merges a point mass on a fixed joint with the link that carries it. The
-    equations of motion change by a few 1e-15 of their size.
+    moment about the link's origin. If the link is a point mass on a fixed joint, it merges this link with the
+    link that carries it. The equations of motion change by a few 1e-15 of their size.
     """
 
     engines = measured_on("pybullet", "mujoco")
@@ -117,25 +117,26 @@ class InertiaOfNoBody(ImpossibleInertia):
     """DX103 inertia-of-no-body: A principal moment of inertia exceeds the sum of the other two, which no body
     can have.
 
-    Each principal moment of a body is the sum of two of three second moments of mass, so none can exceed the
-    sum of the other two. A tensor that breaks this by more than rounding was mistyped, given in mixed units,
-    or taken about different points. Often all six numbers are 1e-6.
+    Each principal moment of a body is an integral over its mass, such as the integral of x^2 + y^2. So no
+    principal moment can exceed the sum of the other two. A tensor that violates this by more than rounding
+    was mistyped, written in mixed units, or computed about several points. Sometimes all six numbers are the
+    placeholder 1e-6.
 
-    - PyBullet 3.2.7 prints "Bad inertia tensor properties" and replaces the whole tensor by ZERO.
-    - MuJoCo 4.0.0 refuses the file ("inertia must satisfy A + B >= C"), for links that cannot move too.
-    - Drake 1.51.1 warns and replaces it by the tensor of a ball of the same mass and the density of water.
+    - PyBullet 3.2.7 prints "Bad inertia tensor properties" and sets the whole tensor to zero.
+    - MuJoCo 4.0.0 refuses the file ("inertia must satisfy A + B >= C"), also if the link cannot move.
+    - Drake 1.51.1 prints a warning, and replaces the tensor by that of a ball of water of the same mass.
     - Pinocchio 4.1.0 uses the numbers unchanged, as dynx does.
 
-    So four engines have three different robots. On public robots the mass matrix is off by 6e-6 (a finger) to
-    4 % (a sensor mount), the accelerations by up to 40 %.
+    So three engines load three different robots, and MuJoCo loads none. On public robots the mass matrix is
+    off by 6e-6 (a finger) to 4 % (a sensor mount), and the accelerations are off by up to 40 %.
 
     What to do: find the true tensor. No engine can be right with this tensor.
 
-    ``dynx doctor --fix`` first tries the links rigidly connected to this one: often their sum is a possible
-    body, and then the inertias are merged, which changes no equation of motion. Otherwise the nearest tensor
-    that a body can have replaces it, and the report says that the physics changed. ``--choose DX103=nearest``
-    never merges links. With ``--choose DX103=keep`` the numbers stay, and the report prints the lines that
-    give them to PyBullet and Drake after loading. MuJoCo cannot use these numbers.
+    ``dynx doctor --fix`` first adds the inertias of the links that are rigidly connected to this link. If a
+    body can have this sum, it merges the inertias into one link, which changes no equation of motion.
+    Otherwise it writes the nearest tensor that a body can have, and the report says that the physics changed.
+    ``--choose DX103=nearest`` never merges links. With ``--choose DX103=keep`` the numbers stay, and the
+    report prints code that gives them to PyBullet and Drake after loading. MuJoCo cannot use these numbers.
     """
 
     fault = "triangle"
@@ -145,27 +146,27 @@ class NegativePrincipalMoment(ImpossibleInertia):
     """DX104 negative-principal-moment: The inertia tensor has a negative principal moment, which no body can
     have.
 
-    A moment of inertia is a sum of masses times squared distances and cannot be negative. A tensor with a
-    negative principal moment mostly comes from one of two mistakes. The parallel axis theorem was applied in
-    the wrong direction or twice. Or the products of inertia are too large for the moments (a misplaced
-    decimal point, mixed units, a swapped pair of numbers). The diagonal may look correct.
+    A moment of inertia is a sum of masses times squared distances, so it cannot be negative. A negative
+    principal moment mostly comes from one of two mistakes. Either the parallel axis theorem was applied in
+    the wrong direction or twice, or the products of inertia are too large for the moments. Reasons for the
+    latter are a misplaced decimal point, mixed units, or two exchanged numbers. The three numbers on the
+    diagonal may look correct.
 
-    - PyBullet 3.2.7 prints "Bad inertia tensor properties" and replaces the whole tensor by ZERO.
-    - MuJoCo 4.0.0 refuses the file ("inertia must have positive eigenvalues"), for links that cannot move
-      too.
-    - Drake 1.51.1 warns and replaces it by the tensor of a ball of the same mass and the density of water.
+    - PyBullet 3.2.7 prints "Bad inertia tensor properties" and sets the whole tensor to zero.
+    - MuJoCo 4.0.0 refuses the file ("inertia must have positive eigenvalues"), also if the link cannot move.
+    - Drake 1.51.1 prints a warning, and replaces the tensor by that of a ball of water of the same mass.
     - Pinocchio 4.1.0 uses the numbers unchanged, as dynx does. The mass matrix may then have a negative
       eigenvalue, and a simulation gains energy without a source.
 
     What to do: find the true tensor. No engine can be right with this tensor.
 
-    ``dynx doctor --fix`` first tries the links rigidly connected to this one: often their sum is a possible
-    body, and then the inertias are merged, which changes no equation of motion. Otherwise the nearest tensor
-    that a body can have replaces it, and the report says that the physics changed. Choose otherwise with
-    ``--choose DX104=nearest`` (never merge) or ``--choose DX104=keep``: the numbers stay, and the report
-    prints the lines that give them to PyBullet and Drake after loading. Where PyBullet's inverse dynamics
-    refuses them even so, its results are extrapolated from those of two robots that it accepts. MuJoCo cannot
-    use these numbers.
+    ``dynx doctor --fix`` first adds the inertias of the links that are rigidly connected to this link. If a
+    body can have this sum, it merges the inertias into one link, which changes no equation of motion.
+    Otherwise it writes the nearest tensor that a body can have, and the report says that the physics changed.
+    ``--choose DX104=nearest`` never merges links. With ``--choose DX104=keep`` the numbers stay, and the
+    report prints code that gives them to PyBullet and Drake after loading. If PyBullet's inverse dynamics
+    refuses them even so, the doctor extrapolates its results from those of two robots that it accepts. MuJoCo
+    cannot use these numbers.
     """
 
     fault = "negative"
@@ -179,24 +180,24 @@ class InertiaNotDiagonal(Rule):
     """DX105 inertia-not-diagonal: PyBullet diagonalises a tensor with products of inertia only to a
     millionth.
 
-    Bullet stores principal moments only. If ``ixy``, ``ixz`` or ``iyz`` is not zero, its loader diagonalises
-    the tensor by Jacobi's method. It stops as soon as the products of inertia are below a millionth of the
-    trace, after one more rotation. The remaining products are dropped.
+    PyBullet stores principal moments only. If ``ixy``, ``ixz`` or ``iyz`` is not zero, its loader
+    diagonalises the tensor by Jacobi's method. When the products of inertia are below a millionth of the
+    trace, it makes one more rotation, and drops the remaining products.
 
     - PyBullet 3.2.7: its tensor is off by 1e-14 to 1e-9 of its size, and by up to 2e-6 where principal
       moments are nearly equal.
     - Pinocchio 4.1.0, MuJoCo 4.0.0 and Drake 1.51.1 are right to rounding.
 
-    The effect: mass matrix and inverse dynamics are off by 1e-13 to 1e-9 of their size, accelerations by up
-    to 1e-8. No simulation shows that. A comparison of two engines to rounding does, and smaller differences
-    are hidden behind it. 46 of 69 public robots have this difference.
+    The effect: mass matrix and inverse dynamics are off by 1e-13 to 1e-9 of their size, and accelerations by
+    up to 1e-8. This is too small to see in a simulation. But if you compare two engines to rounding, this
+    difference hides smaller ones. 46 of the 69 robots of example-robot-data have this difference.
 
-    What to do: nothing if a millionth is good enough. To make engines agree to rounding, give the principal
-    moments and rotate the inertial frame instead.
+    What to do: nothing, if a millionth is good enough. To make engines agree to rounding, write the principal
+    moments, and rotate the inertial frame.
 
-    ``dynx doctor --fix`` does that: it writes the moments about the principal axes, no products of inertia,
-    and the axes in the ``rpy`` of the inertial's origin. It calculates them in extended precision, and writes
-    as many digits as a double has. It is the same tensor. MuJoCo up to 3.13 ignored that ``rpy`` (DX112).
+    ``dynx doctor --fix`` writes the moments about the principal axes, zero products of inertia, and the axes
+    as the ``rpy`` of the inertial's origin. It calculates them in extended precision, and writes all digits
+    of a double. The tensor is the same. MuJoCo up to 3.13 ignores this ``rpy`` (DX112).
     """
 
     engines = measured_on("pybullet")
@@ -241,18 +242,18 @@ class RootInertialRotated(Rule):
     The ``<inertial>`` of the root link has an ``rpy`` that is not zero. With a fixed base the mass of the
     root does not matter to the motion, so this should have no effect.
 
-    - PyBullet 3.2.7 calculates inverse dynamics and Jacobians in the axes of that inertial frame: the
+    - PyBullet 3.2.7 calculates inverse dynamics and Jacobians in the axes of this inertial frame: the
       direction of gravity and the rows of the Jacobian are rotated. The kinematics and the mass matrix are
-      right, which makes the error hard to find.
+      right, so the error is hard to find.
     - Pinocchio 4.1.0, MuJoCo 4.0.0 and Drake 1.51.1 are not affected.
 
-    The effect is as large as the rotation: 2 sin(angle/2) of the weight. A rotation by 90 degrees makes
-    gravity horizontal. Products of inertia of the root have no effect on a fixed base.
+    The effect grows with the rotation: gravity is off by 2 sin(angle/2) of its magnitude. A rotation by 90
+    degrees makes gravity horizontal. Products of inertia of the root have no effect with a fixed base.
 
-    What to do: give the root's tensor in the axes of its link.
+    What to do: write the root's tensor in the axes of its link.
 
-    ``dynx doctor --fix`` does that: the tensor is rotated into the axes of the link and the ``rpy`` set to
-    zero. It is the same body. Nothing is done for a floating base, where there is no such difference.
+    ``dynx doctor --fix`` rotates the tensor into the axes of the link, and sets the ``rpy`` to zero. The body
+    is the same. With a floating base there is no such difference, and the file stays as it is.
     """
 
     engines = measured_on("pybullet")
@@ -288,25 +289,25 @@ class InertiaTooSmall(Rule):
 
     Some engines compare moments of inertia with fixed small numbers, whatever the size of the robot.
 
-    - MuJoCo 4.0.0 refuses a file ("inertia must have positive eigenvalues") in which a principal moment is
-      below 1e-14 kg m^2, unless the whole tensor is zero. Examples are a thin rod with a moment of 0 about
-      its axis, and tensors that are zero except for residues such as -1e-20. It refuses a point mass on a
-      joint ("mass and inertia of moving bodies must be larger than mjMINVAL"). When it merges rigidly
-      connected links, it refuses any partial sum that is a point or a rod. For links that cannot move it
-      checks the tensor all the same.
-    - PyBullet 3.2.7 replaces residues with a negative moment by zero, which has no effect. Its simulation
-      does not move a joint that carries an inertia about its axis below 2.2e-16 kg m^2.
+    - MuJoCo 4.0.0 refuses a file in which a principal moment is below 1e-14 kg m^2 ("inertia must have
+      positive eigenvalues"), unless the whole tensor is zero. Examples are a thin rod with a moment of 0
+      about its axis, and tensors of rounding residues such as -1e-20. It also refuses a point mass on a joint
+      ("mass and inertia of moving bodies must be larger than mjMINVAL"). It merges rigidly connected links
+      one after another, and refuses the file if a sum on the way is a point or a rod. It checks links that
+      cannot move, too.
+    - PyBullet 3.2.7 replaces a tensor with a negative residue by zero, which has no effect on the results.
+      Its simulation does not move a joint if the inertia about the joint axis is below 2.2e-16 kg m^2.
     - Pinocchio 4.1.0 and Drake 1.51.1 use the numbers unchanged.
 
     The effect: the file does not load in MuJoCo.
 
-    What to do: for a robot of ordinary size such a moment has no effect, and 1e-14 has none either. For a
-    robot of micrometres change the unit of length or mass.
+    What to do: in a robot of ordinary size, raise the moment to 1e-14 kg m^2, which has no effect on the
+    results. For a robot of micrometres, change the unit of length or mass.
 
-    ``dynx doctor --fix`` merges such a link with the links rigidly connected to it, which is the same rigid
-    body. If that is not enough, it raises the moments to 1.5e-14 kg m^2. The report says that the physics
-    changed where that is more than rounding of the robot's largest inertia. Nothing is done where it would be
-    more than a thousandth of that.
+    ``dynx doctor --fix`` merges such a link with the links rigidly connected to it, which changes no equation
+    of motion. If this is not enough, it raises the moments to 1.5e-14 kg m^2. If this number is more than a
+    rounding error of the robot's largest inertia, the report says that the physics changed. If it is more
+    than a thousandth of the largest inertia, the file stays as it is.
     """
 
     engines = measured_on("mujoco")
@@ -420,19 +421,20 @@ _MAX_CHANGE_BY_ROTATION = 1e-14
 class InertialRotationIgnored(Rule):
     """DX112 inertial-rotation-ignored: MuJoCo up to 3.13 ignores the rpy of an inertial.
 
-    The ``<origin>`` of an ``<inertial>`` may rotate the axes in which the tensor is given.
+    The ``<origin>`` of an ``<inertial>`` may rotate the axes of the tensor.
 
-    - MuJoCo 3.3.7, 3.12 and 3.13 read the tensor and drop the rotation. They use the tensor as if it were
-      given in the axes of the link (issue 3559 of MuJoCo's repository). MuJoCo 4.0.0 is right.
+    - MuJoCo 3.3.7, 3.12 and 3.13 drop the rotation. They use the tensor as if its axes were those of the link
+      (issue 3559 of MuJoCo's repository). MuJoCo 4.0.0 is right.
     - Pinocchio 4.1.0, PyBullet 3.2.7, Drake 1.51.1 are right.
 
-    The effect: as large as the difference between the principal moments, up to a factor of ten in the mass
-    matrix for long thin links. Mass and centre of mass are right, so gravity torques are, and poses.
+    The effect grows with the difference between the principal moments: for long thin links, entries of the
+    mass matrix are wrong by up to a factor of ten. Mass and centre of mass are right, so poses and gravity
+    torques are right.
 
-    What to do: use MuJoCo 4, or write the tensor in the axes of the link with rpy zero. The latter costs
-    PyBullet an error of 1e-9 (DX105).
+    What to do: use MuJoCo 4. Or write the tensor in the axes of the link, with rpy zero. PyBullet then has an
+    error of 1e-9 (DX105).
 
-    dynx offers no edit: it would undo the remedy of DX105, and newer versions of MuJoCo need none.
+    dynx does not edit the file, because this edit would undo the remedy of DX105.
     """
 
     engines = measured_on(mujoco=">=3.3.7,<=3.13.0")
@@ -470,28 +472,28 @@ class TinyInertialOffset(Rule):
     """DX117 tiny-inertial-offset: MuJoCo drops the pose of an inertial frame that is off the link frame by
     less than 1e-6.
 
-    MuJoCo stores the inertia of a body about its principal axes, the largest moment first, with the centre of
-    mass and the attitude of these axes in the body frame. When it compiles a model it marks frames that
-    coincide (``body_sameframe``), and then does not use the stored pose.
+    MuJoCo stores the inertia of a body about its principal axes, the largest moment first. It also stores the
+    pose of these axes in the body frame: the centre of mass and the rotation. When MuJoCo compiles a model,
+    it marks a body whose inertial frame nearly coincides with the body frame (``body_sameframe``), and then
+    does not use the stored pose.
 
-    - MuJoCo 4.0.0 drops the attitude where each component of the vector part of its quaternion is below 1e-6,
-      that is, a rotation by less than 2e-6 rad. If it does, it drops the centre of mass as well where each
-      coordinate is below 1e-6 m. Rigidly connected links are merged before, so the pose is that of their sum,
+    - MuJoCo 4.0.0 drops the rotation if it is smaller than about 2e-6 rad (each component of the vector part
+      of its quaternion is below 1e-6). It then also drops the centre of mass, if each coordinate is below
+      1e-6 m. MuJoCo merges rigidly connected links first, so these numbers are those of the merged body,
       unless the file has ``<mujoco><compiler fusestatic="false"/></mujoco>``.
     - Pinocchio 4.1.0, PyBullet 3.2.7 and Drake 1.51.1 use all numbers.
 
-    The effect: gravity torques of a balanced link vanish. If the links of a robot are balanced, a centre of
-    mass at 7e-7 m was 2.3e-2 of the torques. Beside heavy links it is 1e-7 of the torques or less. A rotation
-    changes the mass matrix by 1e-6 of the difference between the moments.
+    The effect: in a robot whose links are all balanced, a centre of mass at 7e-7 m caused 2.3e-2 of the
+    torques, which MuJoCo drops. In a robot with other links it is 1e-7 of the torques or less. A dropped
+    rotation changes the mass matrix by 1e-6 of the difference between the moments.
 
-    What to do: usually the offset is noise of a CAD program, and zero is meant. If the numbers are meant,
-    clear the marks after loading:
-    ``model.body_sameframe[:] = model.body_simple[:] = model.dof_simplenum[:] = 0``. No text of an
-    ``<inertial>`` avoids them, because MuJoCo orders the axes itself.
+    What to do: usually the offset is noise of a CAD program. Then write zero. If the number is intended,
+    clear the marks after loading: ``model.body_sameframe[:] = model.body_simple[:] = model.dof_simplenum[:] =
+    0``. No text of an ``<inertial>`` avoids them, because MuJoCo orders the axes itself.
 
-    dynx prints that line and proves it. ``--choose DX117=zero`` writes zero into the file instead, for all
-    engines. The report then says that the physics changed. Without a moving joint, on the floating base, the
-    line does not help, and zero is written.
+    By default dynx prints this line, and proves the cause by it. ``--choose DX117=zero`` writes zero into the
+    file instead, for all engines. The report then says that the physics changed. If a robot with a floating
+    base has no moving joint, the line has no effect, and dynx writes zero.
     """
 
     engines = measured_on("mujoco")
@@ -584,24 +586,24 @@ class InertiaRoundedUnsymmetrically(Rule):
     of a heavy link's tensor.
 
     Before the first call of ``calculateInverseDynamics``, ``calculateMassMatrix`` or ``calculateJacobian``,
-    PyBullet 3.2.7 moves the tensor of each link to the link's origin, and checks that it is symmetric. It
-    computes two opposite entries as ``(m x) y`` and ``(m y) x``, which are rounded differently. It compares
+    PyBullet 3.2.7 computes the tensor of each link about the link's origin, and checks that it is symmetric.
+    It computes two opposite entries as ``(m x) y`` and ``(m y) x``, whose rounding errors differ. It compares
     their difference with a fixed bound of 1.1e-15 kg m^2 (five units in the last place of 1), whatever the
-    size of the link. A link can fail once two coordinates of its centre of mass, along the principal axes,
-    and its mass have a product above 2 kg m^2. Of links with a centre of mass within half a metre, a quarter
-    failed at 100 kg, and four of five at 100 t.
+    size of the link. Here m is the mass, and x and y are two coordinates of the centre of mass along the
+    principal axes. A link can fail if m x y is above 2 kg m^2. In a test with centres of mass within half a
+    metre, a quarter of the links failed at 100 kg, and four of five at 100 t.
 
     - PyBullet 3.2.7 prints "invalid inertia tensor for body 3 I(2,0)!=I(0,2)", and all three calls raise an
-      exception for the robot from then on. Links that cannot move are checked too, but never the root. Poses
-      and the simulation are right.
+      exception for this robot. PyBullet also checks links that cannot move, but never the root. Poses and the
+      simulation are right.
     - Pinocchio 4.1.0, MuJoCo 4.0.0 and Drake 1.51.1 have no such check.
 
     The effect: no inverse dynamics, no mass matrix and no Jacobian in PyBullet.
 
     What to do: change the last digit of the centre of mass.
 
-    ``dynx doctor --fix`` moves the centre of mass by a few units in the last place, so that the products are
-    rounded alike. The equations of motion change by rounding.
+    ``dynx doctor --fix`` moves the centre of mass by a few units in the last place, so that both products
+    have the same rounding error. The equations of motion change by rounding.
     """
 
     engines = measured_on("pybullet")

@@ -34,22 +34,22 @@ class DampingInInverseDynamics(CallingRule):
     """DX301 damping-in-inverse-dynamics: A joint has damping, which some engines add to the torque and others
     do not.
 
-    ``<dynamics damping="0.5"/>`` resists the velocity of a joint. There are two conventions on whether
-    inverse dynamics includes it:
+    ``<dynamics damping="0.5"/>`` is a torque against the velocity of a joint. In some engines inverse
+    dynamics includes this torque:
 
-    - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``): rigid bodies only.
-    - MuJoCo 4.0 (``mj_inverse``): damping times velocity is added.
-    - Drake 1.51 (``CalcInverseDynamics`` with the plant's force elements): likewise.
-    - MJCF and SDF: MuJoCo and Drake likewise. PyBullet (``loadMJCF``) drops damping.
-    - Forward dynamics: PyBullet's ``stepSimulation``, MuJoCo and Drake damp, Pinocchio's ``aba`` does not.
+    - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``): not included.
+    - MuJoCo 4.0 (``mj_inverse``) and Drake 1.51 (``CalcInverseDynamics`` with the plant's force elements):
+      included, also from MJCF and SDF. PyBullet (``loadMJCF``) drops the damping in MJCF.
+    - Forward dynamics: included in PyBullet's ``stepSimulation``, MuJoCo and Drake, and not included in
+      Pinocchio's ``aba``.
 
-    The effect is damping times velocity, often a few per cent of the torque. Where the inertia is low, it is
+    The effect is damping times velocity, often a few per cent of the torque. If the inertia is small, it is
     most of the torque.
 
-    What to do: decide which convention you want, and add ``damping * v`` to Pinocchio's torque or switch
-    damping off in the others. The file is correct, so ``dynx doctor --fix`` does not change it. dynx returns
-    the rigid-body torque unless called with ``joint_dynamics=True``. The doctor compares the rigid-body
-    torque and prints the calls that switch damping off in each engine.
+    What to do: decide whether torques include damping. Then add ``damping * v`` to Pinocchio's torque, or
+    switch damping off in the other engines. The file is correct, so ``dynx doctor --fix`` does not change it.
+    dynx returns the torque of the rigid bodies alone, unless you write ``joint_dynamics=True``. The doctor
+    compares this torque, and prints the calls that switch damping off in each engine.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf", "sdf")
@@ -72,19 +72,20 @@ class FrictionInInverseDynamics(CallingRule):
     """DX302 friction-in-inverse-dynamics: A joint has dry friction, which MuJoCo adds to the torque and
     others do not.
 
-    ``<dynamics friction="0.2"/>`` is a force that opposes the motion at any speed.
+    ``<dynamics friction="0.2"/>`` is a constant torque against the motion of a joint.
 
-    - MuJoCo 4.0 reads it as ``frictionloss``, a constraint. ``mj_inverse`` adds the force of the constraint:
-      the friction times the sign of the velocity, or less at low speed, where the constraint can hold the
-      joint.
-    - Pinocchio 4.1 stores it and does not use it. PyBullet 3.2.7 does not use it in inverse dynamics. Drake
-      1.51 warns that it does not support it.
+    - MuJoCo 4.0 reads it as ``frictionloss``, a constraint. ``mj_inverse`` adds the force of this constraint:
+      the friction times the sign of the velocity. At low speed it adds less, because a smaller force can hold
+      the joint.
+    - Pinocchio 4.1 stores the friction, but does not use it. PyBullet 3.2.7 does not use it in inverse
+      dynamics. Drake 1.51 prints a warning that it does not support it.
 
-    The effect is the friction itself, a few per cent of the torque for a geared arm.
+    The effect is as large as the friction: a few per cent of the torque for an arm with gears.
 
-    What to do: decide which convention you want. The file is correct, so ``dynx doctor --fix`` does not
-    change it. dynx returns the rigid-body torque unless called with ``joint_dynamics=True``. The doctor
-    compares the rigid-body torque and prints the call that switches friction off in MuJoCo.
+    What to do: decide whether torques include friction. The file is correct, so ``dynx doctor --fix`` does
+    not change it. dynx returns the torque of the rigid bodies alone, unless you write
+    ``joint_dynamics=True``. The doctor compares this torque, and prints the call that switches friction off
+    in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")
@@ -110,8 +111,8 @@ class NegativeDamping(EditingRule):
     - MuJoCo 4.0 and PyBullet 3.2.7 simulate a joint that accelerates itself.
     - Pinocchio 4.1 stores the number and does not use it.
 
-    Nothing in the rigid-body dynamics depends on it. With ``joint_dynamics=True`` dynx uses the number
-    unchanged, with a note.
+    The torque of the rigid bodies does not depend on damping. With ``joint_dynamics=True`` dynx uses the
+    negative number, with a note.
 
     What to do: correct the sign. ``dynx doctor --fix`` removes it. ``--choose DX303=zero`` writes 0 instead.
     """
@@ -138,19 +139,19 @@ class MimicAsConstraint(CallingRule):
 
     ``<mimic joint="a" multiplier="2" offset="0.1"/>`` means that the joint is always at 2 a + 0.1.
 
-    - Pinocchio 4.1 and PyBullet 3.2.7 load the joint as free and ignore the tag. Pinocchio has
-      ``buildModelFromUrdf(..., mimic=True)``, with which the joint has no coordinate.
-    - MuJoCo 4.0 makes a soft equality constraint of it, and the joint has a coordinate. Where the constraint
-      is violated, ``mj_inverse`` adds the restoring force, which can be a hundred times the torque.
-    - Drake 1.51 makes a constraint of it that discrete-time simulation keeps. Its inverse dynamics ignores
-      it, and continuous-time forward dynamics refuses to run.
+    - Pinocchio 4.1 and PyBullet 3.2.7 ignore ``<mimic>``, and the joint moves freely. With
+      ``buildModelFromUrdf(..., mimic=True)``, the joint has no coordinate in Pinocchio.
+    - MuJoCo 4.0 adds a soft equality constraint, and the joint has a coordinate. If the state violates the
+      constraint, ``mj_inverse`` adds the force of the constraint, which can be a hundred times the torque.
+    - Drake 1.51 adds a constraint, which discrete-time simulation keeps. Its inverse dynamics ignores the
+      constraint, and its continuous-time forward dynamics raises an error.
 
-    None of these is wrong. They are different robots. dynx gives a mimic joint no coordinate, and its torque
-    goes to the joint it follows, in every backend.
+    None of these is wrong, but they are different robots. In dynx a mimic joint has no coordinate, and its
+    torque acts on the joint that it follows, on every backend.
 
-    What to do: know which interpretation you use. doctor compares all engines with every joint free, where
-    the dynamics of the bodies is the same, and prints the calls that switch the constraints off. The file is
-    correct, so ``dynx doctor --fix`` does not change it.
+    What to do: find out how your engine reads mimic joints. The doctor compares all engines with free mimic
+    joints, and prints the calls that switch the constraints off. The file is correct, so ``dynx doctor
+    --fix`` does not change it.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "sdf")
@@ -179,16 +180,16 @@ _EITHER = ("damping", "friction")
 class EmptyDynamics(EditingRule):
     """DX305 empty-dynamics: A dynamics element has neither damping nor friction.
 
-    ``<dynamics/>``, or one that holds only an extension such as ``armature="0.01"``. URDF makes both
-    attributes optional and defines their defaults. It does not require one of them.
+    Examples are ``<dynamics/>``, or an element that has only an extension such as ``armature="0.01"``. In
+    URDF both ``damping`` and ``friction`` are optional.
 
-    - Pinocchio 4.1 and PyBullet 3.2.7 refuse the file: "joint dynamics element specified with no damping and
-      no friction". They do so for every type of joint, fixed ones included.
-    - MuJoCo 4.0 and Drake 1.51 read it.
+    - Pinocchio 4.1 and PyBullet 3.2.7 refuse the file ("joint dynamics element specified with no damping and
+      no friction"), for every type of joint, also fixed joints.
+    - MuJoCo 4.0 and Drake 1.51 read the file.
 
-    What to do: write ``damping="0"``, or remove the element. ``dynx doctor --fix`` adds ``damping="0"``,
-    which keeps other attributes. A number under a misspelled name, ``<dynamics dampng="0.5"/>``, is what was
-    meant, and gets the right name.
+    What to do: write ``damping="0"``, or remove the element. ``dynx doctor --fix`` corrects a misspelled
+    name, such as ``<dynamics dampng="0.5"/>``. Otherwise it adds ``damping="0"``, and keeps the other
+    attributes.
     """
 
     stage = "reading"
@@ -208,23 +209,23 @@ class EmptyDynamics(EditingRule):
 class LimitsAsForces(CallingRule):
     """DX306 limits-as-forces: A joint has equal limits, to which some engines pull the joint.
 
-    ``<limit lower="-2" upper="2"/>`` defines the range of a joint. URDF does not define what happens beyond,
-    and a joint with equal limits violates them at every other position.
+    ``<limit lower="-2" upper="2"/>`` defines the range of a joint. URDF does not define what happens beyond
+    this range. A joint with two equal limits is beyond its range at every other position.
 
     - Pinocchio 4.1 and Drake 1.51: no effect. Inverse and forward dynamics have no limits (Drake's discrete
       simulation does).
-    - MuJoCo 4.0: a joint beyond its limit is pushed back by a constraint force, and ``mj_inverse`` adds that
-      force to the torque. Forces of a hundred times the torque were measured. MuJoCo ignores equal limits,
-      with a warning.
-    - PyBullet 3.2.7: ``stepSimulation`` pushes the joint back to the limit, equal ones included.
+    - MuJoCo 4.0: a constraint force pushes a joint beyond its limit back, and ``mj_inverse`` adds this force
+      to the torque. The force can be a hundred times the torque. MuJoCo ignores equal limits, with a warning.
+    - PyBullet 3.2.7: ``stepSimulation`` pushes a joint beyond its limit back, also if the limits are equal.
       ``calculateInverseDynamics`` ignores limits. PyBullet ignores a limit of ``lower="0"`` without ``upper``
       (see DX216 for other limits without ``upper``).
 
-    Within limits all engines agree, and doctor compares there. A joint with equal limits is compared at any
-    position, because the equations of motion have no limits.
+    The doctor compares engines at positions within the limits, where all engines agree. It compares a joint
+    with equal limits at any position, because the equations of motion have no limits.
 
-    What to do: write the range of the joint, or ``type="fixed"`` (see DX508). The file does not say which, so
-    ``dynx doctor --fix`` does not change it. The doctor prints the calls that switch limits off.
+    What to do: write the range of the joint, or ``type="fixed"`` (see DX508). The file does not say which of
+    the two is right, so ``dynx doctor --fix`` does not change it. The doctor prints the calls that switch
+    limits off.
     """
 
     advice = "Write the range of the joint, or switch its limits off."
@@ -251,17 +252,17 @@ class RotorInertia(CallingRule):
 
     ``<drake:rotor_inertia value="0.001"/>`` and ``<drake:gear_ratio value="10"/>`` in the ``<actuator>`` of a
     ``<transmission>`` are an extension of Drake. A rotor behind a gear of ratio n adds n^2 times its own
-    inertia to the joint.
+    inertia to the joint. This is the reflected inertia, or armature.
 
-    - Drake 1.51 adds that to the diagonal of the mass matrix and to inverse dynamics.
-    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 do not know the tags. Neither does dynx.
+    - Drake 1.51 adds the armature to the diagonal of the mass matrix and to inverse dynamics.
+    - Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and dynx ignore these elements in URDF.
 
-    The effect is the reflected inertia: for a geared arm often as large as that of the links.
+    The effect is as large as the armature: in an arm with gears, often as large as the inertia of the links.
 
-    What to do: decide whether the rotors belong to your robot. Pinocchio has ``model.armature`` for them,
-    MuJoCo ``dof_armature``, dynx ``<dynamics armature="...">``. The file is correct, so ``dynx doctor --fix``
-    does not change it. The doctor compares without rotors and prints the call that switches them off in
-    Drake.
+    What to do: decide whether your robot model includes the rotors. For the armature, Pinocchio has
+    ``model.armature``, MuJoCo has ``dof_armature``, and dynx reads ``<dynamics armature="...">``. The file is
+    correct, so ``dynx doctor --fix`` does not change it. The doctor compares without rotors, and prints the
+    call that switches them off in Drake.
     """
 
     advice = "Decide whether rotors belong to the robot, and configure each engine accordingly."
@@ -284,19 +285,22 @@ class RotorInertia(CallingRule):
 class ContactsAsForces(CallingRule):
     """DX308 contacts-as-forces: Links have collision shapes, whose contacts MuJoCo adds to the torque.
 
-    ``<collision>`` defines the shape of a link for contacts. Two links that touch, or overlap because their
-    shapes are larger than the links, push each other apart in a simulation.
+    ``<collision>`` defines the shape of a link for contacts. In a simulation, two links push each other apart
+    if their shapes touch or overlap. Shapes often overlap because they are larger than the links.
 
-    - MuJoCo 4.0: ``mj_inverse`` finds the contacts of the configuration and adds their forces to the torque.
-      Contacts between a link and its parent are left out, those of other pairs are not. If shapes overlap by
-      design, the error of the torque is unbounded. The report calls such forces present. It names the links
-      that touch at states within limits in which mimic joints follow.
+    - MuJoCo 4.0: ``mj_inverse`` finds the contacts of the configuration, and adds their forces to the torque.
+      It leaves out contacts between a link and its parent, but not contacts between other links. If shapes
+      overlap, the error of the torque can have any size.
     - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) have no contacts. PyBullet
-      simulates contacts of a robot with itself only with a flag. Drake 1.51 has them where a scene graph is
-      connected, and not in inverse dynamics.
+      simulates contacts of a robot with itself only with a flag. Drake 1.51 has contacts if a scene graph is
+      connected, but not in inverse dynamics.
 
-    What to do: know whether your torques include contacts. The file is correct, so ``dynx doctor --fix`` does
-    not change it. The doctor compares without contacts and prints the call that switches them off in MuJoCo.
+    The doctor searches for states within the limits, with mimic joints that follow, at which links touch. The
+    report names these links.
+
+    What to do: find out whether your torques include contacts. The file is correct, so ``dynx doctor --fix``
+    does not change it. The doctor compares without contacts, and prints the call that switches them off in
+    MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")

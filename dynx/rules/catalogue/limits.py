@@ -32,13 +32,13 @@ class JointWithoutLimit(EditingRule):
     - Pinocchio 4.1 and PyBullet 3.2.7 refuse the file.
     - MuJoCo 4.0 and Drake 1.51 read a joint without limits.
 
-    A tag spelled wrongly, such as ``<Limit>``, has the same effect: readers do not know it.
+    A misspelled element, such as ``<Limit>``, has the same effect, because readers ignore it.
 
-    What to do: write the limits of the joint. A misspelled tag contains them, and ``dynx doctor --fix``
-    corrects it. Otherwise the file does not contain them, so ``dynx doctor --fix`` leaves the joint
-    unlimited: a revolute joint becomes ``continuous``, a prismatic one gets the largest double for its
-    limits. ``--choose DX203=zero`` writes ``lower="0" upper="0"`` instead, the numbers that URDF has for a
-    ``<limit>`` in which they are not given. The joint then must not move in simulations that keep to limits.
+    What to do: write the limits of the joint. ``dynx doctor --fix`` corrects a misspelled element. Without
+    such an element the file contains no limits, and ``dynx doctor --fix`` leaves the joint unlimited: a
+    revolute joint becomes ``continuous``, and a prismatic joint gets the largest double for its limits.
+    ``--choose DX203=zero`` writes ``lower="0" upper="0"`` instead, which are URDF's defaults in a
+    ``<limit>``. Simulations with limits then hold the joint at 0.
     """
 
     stage = "reading"
@@ -79,17 +79,18 @@ def _limit_renamed(case: Case, element: SourceElement) -> Edit:
 class LimitWithoutEffortOrVelocity(EditingRule):
     """DX204 limit-without-effort-or-velocity: A limit does not state the largest effort or velocity.
 
-    URDF requires both up to version 1.1, although neither enters any equation of motion.
+    Up to version 1.1, URDF requires the attributes ``effort`` and ``velocity``. They do not affect the
+    equations of motion.
 
-    - Pinocchio 4.1 refuses the file: "limit has no effort". It does so for every type of joint, fixed ones
-      included. If the robot states ``version="1.2"``, it does not (see DX222).
-    - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file. So does dynx: what is not given is unlimited.
+    - Pinocchio 4.1 refuses the file ("limit has no effort"), for every type of joint, also fixed joints. If
+      the robot states ``version="1.2"``, Pinocchio reads it (see DX222).
+    - PyBullet 3.2.7, MuJoCo 4.0, Drake 1.51 and dynx read the file. In dynx a missing limit means unlimited.
 
     Files with such limits are common, because only urdfdom, the reader of Pinocchio and ROS, checks them.
 
-    What to do: write both. A number under a misspelled name, ``velocty="2"``, is what was meant, and
-    ``dynx doctor --fix`` corrects the name. Otherwise the file does not contain them, and it writes the
-    largest double, which every engine reads and which dynx reads as "no limit".
+    What to do: write both attributes. ``dynx doctor --fix`` corrects a misspelled name, such as
+    ``velocty="2"``. For a missing attribute it writes the largest double, which every engine reads and which
+    dynx reads as "no limit".
     """
 
     stage = "reading"
@@ -111,17 +112,17 @@ class LimitWithoutEffortOrVelocity(EditingRule):
 class LowerLimitAboveUpper(EditingRule):
     """DX205 lower-limit-above-upper: The lower limit of a joint is above its upper limit.
 
-    The two ends were exchanged, or the sign of one was lost.
+    Usually the two limits were exchanged, or the sign of one was lost.
 
     - Drake 1.51 refuses the file, with a message that shows a failed condition in Drake's C++ sources. It
-      does so for continuous joints too, whose limits have no meaning.
+      also refuses such limits of a continuous joint, where limits have no meaning.
     - MuJoCo 4.0 and PyBullet 3.2.7 treat the joint as unlimited.
-    - Pinocchio 4.1 stores them unchanged, so random configurations and clamping go wrong.
+    - Pinocchio 4.1 stores the limits unchanged, so random configurations and clamping are wrong.
 
     The equations of motion do not depend on limits. dynx uses the smaller number as the lower limit.
 
-    What to do: correct the limits. ``dynx doctor --fix`` exchanges them. ``--choose DX205=unlimited`` writes
-    the largest double for both, as MuJoCo and PyBullet treat them.
+    What to do: correct the limits. ``dynx doctor --fix`` exchanges them. ``--choose DX205=unlimited`` makes
+    the joint unlimited in all engines, as it is in MuJoCo and PyBullet.
     """
 
     stage = "reading"
@@ -154,15 +155,16 @@ class NegativeEffortOrVelocity(EditingRule):
     Other formats use ``-1`` for "no limit". Otherwise the sign is a mistake.
 
     - Pinocchio 4.1 refuses the file: "Some components of min_effort are greater than max_effort".
-    - Drake 1.51 refuses a negative velocity with a failed condition in its C++ sources. It ignores a negative
-      effort unless a ``<transmission>`` gives the joint an actuator: then it refuses the file too, "which has
-      a negative effort limit".
-    - PyBullet 3.2.7 reads both unchanged. MuJoCo 4.0 reads no velocity, and drops the sign of an effort.
+    - Drake 1.51 refuses a negative velocity, with a failed condition in its C++ sources. It refuses a
+      negative effort only if a ``<transmission>`` gives the joint an actuator ("which has a negative effort
+      limit"). Otherwise it ignores the effort.
+    - PyBullet 3.2.7 reads both limits unchanged. MuJoCo 4.0 does not read the velocity, and drops the sign of
+      the effort.
 
-    The equations of motion do not depend on these limits. dynx reads the number with a note.
+    The equations of motion do not depend on these limits. dynx reads the number, with a note.
 
-    What to do: write the intended limits. ``dynx doctor --fix`` removes the sign. Where ``-1`` stands for "no
-    limit", ``--choose DX206=unlimited`` writes the largest double instead.
+    What to do: write the intended limits. ``dynx doctor --fix`` removes the sign. If ``-1`` means "no limit",
+    ``--choose DX206=unlimited`` writes the largest double instead.
     """
 
     stage = "reading"
@@ -193,15 +195,15 @@ class NegativeEffortOrVelocity(EditingRule):
 class SafetyControllerWithoutGain(EditingRule):
     """DX207 safety-controller-without-gain: A safety controller has no k_velocity.
 
-    The element belongs to the PR2's controllers and to ROS. No engine simulates it. URDF requires its
-    attribute ``k_velocity``. The others are optional.
+    ``<safety_controller>`` is an element for controllers in ROS. No engine simulates it. URDF requires its
+    attribute ``k_velocity``; its other attributes are optional.
 
     - Pinocchio 4.1 refuses the file: "joint safety: no k_velocity".
     - PyBullet 3.2.7 and MuJoCo 4.0 ignore it. Drake 1.51 warns that it ignores it.
 
-    What to do: remove the element unless one of your programs reads it, or complete it. ``dynx doctor --fix``
-    adds ``k_velocity="0"``, with which the described controller has no effect. A number
-    under a misspelled name, ``k_velocty="20"``, is what was meant, and gets the right name.
+    What to do: if one of your programs reads the element, complete it; otherwise remove it. ``dynx doctor
+    --fix`` corrects a misspelled name, such as ``k_velocty="20"``. Otherwise it adds ``k_velocity="0"``, with
+    which the safety controller has no effect.
     """
 
     stage = "reading"
@@ -225,25 +227,25 @@ class UpperLimitMissing(EditingRule):
     """DX216 upper-limit-missing: A limit has a lower end of -1 or less and no upper end, which PyBullet reads
     as -1.
 
-    In URDF a missing end of the range is 0, so ``<limit lower="-2" .../>`` is the range -2 to 0. This is
-    rarely intended.
+    In URDF a missing ``lower`` or ``upper`` is 0, so ``<limit lower="-2" .../>`` is the range -2 to 0. This
+    is rarely intended.
 
-    - PyBullet 3.2.7 reads a missing ``upper`` as -1. The range is -2 to -1, and a joint between -1 and 0 is
-      outside this range. In ``stepSimulation`` the joint can move towards -1 but not away from it, as at a
-      stop. ``calculateInverseDynamics`` has no limits.
-    - Pinocchio 4.1 has the range -2 to 0. So has dynx, with a note.
-    - Drake 1.51 has a lower limit of -2 and no upper one. MuJoCo 4.0 ignores a limit with one end.
+    - PyBullet 3.2.7 reads a missing ``upper`` as -1, so the range is -2 to -1. A joint between -1 and 0 is
+      outside this range. In ``stepSimulation`` the joint can then move towards -1 but not away from it, as at
+      a stop. ``calculateInverseDynamics`` ignores limits.
+    - Pinocchio 4.1 and dynx (with a note) have the range -2 to 0.
+    - Drake 1.51 has a lower limit of -2 and no upper limit. MuJoCo 4.0 ignores a ``<limit>`` with only one of
+      the two.
 
-    Only PyBullet's range affects a motion that the file allows. Where ``lower`` is above -1, it is above
-    PyBullet's ``upper``, and PyBullet then ignores both, as it does where neither is given (DX508). A missing
-    ``lower`` is 0 in PyBullet and in Pinocchio, and again no limit in Drake and MuJoCo.
+    Only PyBullet's range affects a motion that the file allows. If ``lower`` is above -1, it is above
+    PyBullet's ``upper``, and PyBullet ignores both limits. A missing ``lower`` is 0 in PyBullet and in
+    Pinocchio, and no limit in Drake and MuJoCo.
 
-    The effect is a joint that does not move: in PyBullet's simulation, and only in the part of the range
-    above -1, its whole acceleration is lost.
+    The effect: in PyBullet's simulation, a joint between -1 and 0 does not accelerate.
 
-    What to do: write the intended end. A number under a misspelled name, ``uper="1"``, is what was meant, and
-    ``dynx doctor --fix`` corrects the name. Otherwise the file does not contain the end, and it writes
-    ``upper="0"``, as URDF, Pinocchio and dynx read it. The other three engines then have that range too.
+    What to do: write the intended limit. ``dynx doctor --fix`` corrects a misspelled name, such as
+    ``uper="1"``. Otherwise it writes ``upper="0"``, as URDF, Pinocchio and dynx read it. The other three
+    engines then have this range, too.
     """
 
     advice = "Write both ends of every range."
@@ -267,17 +269,16 @@ _TYPES_WITH_LIMIT = ("revolute", "prismatic", "fixed", "floating", "planar")
 class LimitIncompleteInUrdf12(EditingRule):
     """DX222 limit-incomplete-in-urdf-1-2: A robot states URDF 1.2, and a limit lacks its lower or upper end.
 
-    Up to URDF 1.1 a missing ``lower`` or ``upper`` is 0. From version 1.2 on the ``<limit>`` of every joint
-    that is not continuous needs both, and ``effort`` and ``velocity`` may be missing.
+    Up to URDF 1.1, a missing ``lower`` or ``upper`` is 0. From URDF 1.2, the ``<limit>`` of every joint that
+    is not continuous needs ``lower`` and ``upper``, but ``effort`` and ``velocity`` may be missing.
 
     - Pinocchio 4.1 (its reader is urdfdom) refuses the file: "revolute and prismatic joints must have both
-      lower and upper position limits specified in URDF version 1.2 or later". A fixed joint with a
-      ``<limit>`` counts.
-    - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore the version. dynx reads a missing end as 0.
+      lower and upper position limits specified in URDF version 1.2 or later". It also refuses a fixed joint
+      with such a ``<limit>``.
+      - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore the version. dynx reads a missing limit as 0.
 
-    What to do: write both ends. ``dynx doctor --fix`` writes 0 for the missing one, as earlier versions of
-    URDF define it. A number under a misspelled name, ``uper="1"``, is what was meant, and gets the right
-    name.
+      What to do: write both limits. ``dynx doctor --fix`` corrects a misspelled name, such as ``uper="1"``.
+      Otherwise it writes 0 for the missing limit, as earlier versions of URDF define it.
     """
 
     stage = "reading"
@@ -299,16 +300,16 @@ class LimitIncompleteInUrdf12(EditingRule):
 class EffortLimitZero(Rule):
     """DX506 effort-limit-zero: The effort limit of a joint is zero, so its motor can apply no force.
 
-    ``effort="0"`` is mostly written because URDF requires the attribute. It states that the motor can apply
-    no force.
+    Authors mostly write ``effort="0"`` because URDF requires the attribute. But it means that the motor can
+    apply no force.
 
-    Pinocchio and PyBullet store the zero, so torques that are clipped to it become zero. Gazebo and
-    ros_control leave such a joint without force. MuJoCo reads 0 as "no limit" (no ``actfrcrange``), Drake as
-    "no actuator" where a transmission names the joint. The dynamics is the same on all engines, but the limit
-    is not.
+    Pinocchio and PyBullet store the zero. A program that saturates torques at this limit gets zero torque.
+    Gazebo and ros_control apply no force to such a joint. MuJoCo reads 0 as "no limit" (no ``actfrcrange``).
+    Drake reads 0 as "no actuator" if a transmission names the joint. The equations of motion are the same in
+    all engines.
 
-    For a passive joint (a wheel, a tendon's idler) zero is correct. A mimic joint, which needs no motor, is
-    not reported. The file does not contain the true limit, so there is no remedy.
+    For a passive joint, such as a wheel without motor, zero is correct. The rule does not report mimic
+    joints, which need no motor. The file does not contain the true limit, so no edit removes the cause.
     """
 
     kind = "practice"
@@ -326,12 +327,12 @@ class EffortLimitZero(Rule):
 class VelocityLimitZero(Rule):
     """DX507 velocity-limit-zero: The velocity limit of a joint is zero, so it must not move.
 
-    ``velocity="0"`` is mostly written because URDF requires the attribute. It states that the joint must not
-    move.
+    Authors mostly write ``velocity="0"`` because URDF requires the attribute. But it means that the joint
+    must not move.
 
-    Planners that time a path (MoveIt, TOPP-RA, Ruckig) divide by it or report that there is no trajectory.
-    Pinocchio and Drake store the zero, PyBullet stores it as ``maxVelocity`` and does not apply it, MuJoCo
-    does not read it. Dynamics is the same with all.
+    Planners that time a path (MoveIt, TOPP-RA, Ruckig) divide by the limit, or report that there is no
+    trajectory. Pinocchio and Drake store the zero. PyBullet stores it as ``maxVelocity`` and does not apply
+    it. MuJoCo does not read it. The equations of motion are the same in all engines.
 
     The file does not contain the true limit, so no edit removes the cause.
     """
@@ -351,16 +352,16 @@ class RangeOfZeroWidth(Rule):
     """DX508 range-of-zero-width: The lower and upper limit of a joint are equal or absent, so it has no range
     to move in.
 
-    A ``<limit>`` without ``lower`` and ``upper`` means 0 and 0: URDF's default for both is zero, not "none".
-    So the joint has a coordinate and cannot move.
+    In URDF the default of ``lower`` and ``upper`` is 0. So a ``<limit>`` without them has the range 0 to 0:
+    the joint has a coordinate, but cannot move.
 
-    Engines interpret it differently. Where the attributes are absent, Pinocchio has the range 0 to 0, and
-    PyBullet, MuJoCo and Drake have none, so there the joint moves freely. Where two equal numbers are
-    written, Pinocchio and Drake keep them as limits, PyBullet's stepper holds the joint still, and MuJoCo
-    warns and ignores them. The equations of motion are the same with all.
+    Engines differ. If both attributes are absent, Pinocchio has the range 0 to 0. In PyBullet, MuJoCo and
+    Drake the joint has no limits and moves freely. If two equal numbers are written, Pinocchio and Drake keep
+    them as limits. PyBullet's ``stepSimulation`` holds the joint there. MuJoCo prints a warning and ignores
+    them. The equations of motion are the same in all engines.
 
-    Whether ``fixed``, ``continuous`` or a range was meant is not known from the file, so no edit removes the
-    cause.
+    The file does not say whether the author meant ``fixed``, ``continuous`` or a range, so no edit removes
+    the cause.
     """
 
     kind = "practice"
@@ -385,14 +386,14 @@ class LimitsOnContinuousJoint(EditingRule):
     """DX509 limits-on-continuous-joint: A continuous joint has a lower or an upper limit, which has no
     meaning there.
 
-    ``type="continuous"`` means a joint that rotates without limit. Its ``lower`` and ``upper`` have no
-    meaning. Pinocchio and MuJoCo ignore them, PyBullet reports them in ``getJointInfo`` and does not apply
-    them, and Drake 1.51 makes them the limits of the joint. The equations of motion are the same with all,
-    but readers of the file assume the range.
+    A joint with ``type="continuous"`` rotates without limit, so ``lower`` and ``upper`` have no meaning.
+    Pinocchio and MuJoCo ignore them. PyBullet reports them in ``getJointInfo`` and does not apply them. In
+    Drake 1.51 they are the limits of the joint. The equations of motion are the same in all engines, but a
+    person who reads the file may think that the joint has this range.
 
-    What to do: if the joint has a range, write ``type="revolute"`` and keep them. Else remove the two
-    attributes, so that the joint is unlimited in every engine. ``dynx doctor --fix`` does so with
-    ``--choose DX509=drop``, and by default leaves them.
+    What to do: if the joint has a range, write ``type="revolute"``. Otherwise remove the two attributes, so
+    that the joint is unlimited in every engine. By default ``dynx doctor --fix`` leaves them. With ``--choose
+    DX509=drop`` it removes them.
     """
 
     kind = "practice"
@@ -417,12 +418,12 @@ class ZeroOutsideLimits(Rule):
     """DX510 zero-outside-limits: Zero lies outside the range of a joint, and nearly every tool starts there.
 
     Nearly every tool starts at zero: PyBullet after loadURDF, RViz, MuJoCo's ``qpos0``,
-    ``pinocchio.neutral``, Drake's default context. If zero is outside the range of a joint, a simulation
-    begins with a force that pushes the joint back. Planners call the start state invalid, and a check of
-    self-collision at "home" checks a pose that the robot cannot reach.
+    ``pinocchio.neutral``, and Drake's default context. If zero is outside the range of a joint, a simulation
+    begins with a force that pushes the joint back. Planners refuse such a start state. A check of
+    self-collision at the zero configuration checks a configuration that the robot cannot reach.
 
-    Such a range is legal and sometimes wanted (an elbow that cannot be stretched), so the doctor reports it
-    and does not correct it. Another zero would change the numbers in every program that uses the robot.
+    Such a range is valid, and right for an elbow that cannot be stretched. So the doctor reports it and does
+    not correct it. Another zero of the joint would change the numbers in every program that uses the robot.
     """
 
     kind = "practice"

@@ -14,15 +14,15 @@ from dynx.rules.numbers_in_text import is_number
 class MaterialDefinedTwice(EditingRule):
     """DX415 material-defined-twice: Two materials of the robot have the same name.
 
-    Materials are only colours, but a second definition decides whether the file loads:
+    Materials are only colours, but some engines refuse a second definition:
 
     - Pinocchio 4.1 ("material is not unique") and Drake 1.51 ("was previously defined") refuse the file.
-    - PyBullet 3.2.7 warns. MuJoCo 4.0 does not check.
+    - PyBullet 3.2.7 prints a warning. MuJoCo 4.0 does not check.
 
-    This happens when the files of an arm and of a hand are combined.
+    This happens when someone combines the files of an arm and of a hand.
 
-    What to do: keep one. ``dynx doctor --fix`` keeps the first and removes the others, whatever their colour.
-    Materials inside ``<visual>`` are not changed.
+    What to do: keep one definition. ``dynx doctor --fix`` keeps the first and removes the others, whatever
+    their colour. It does not change materials inside ``<visual>``.
     """
 
     stage = "reading"
@@ -44,19 +44,18 @@ class MaterialDefinedTwice(EditingRule):
 class TextureNotFound(EditingRule):
     """DX426 texture-not-found: A material of the robot has a texture that Drake does not find.
 
-    ``<material>`` directly in the robot may name an image: ``<texture filename="wood.png"/>``.
+    A ``<material>`` directly in ``<robot>`` may name an image: ``<texture filename="wood.png"/>``.
 
-    - Drake 1.51 looks for the image when it parses the file, with or without a scene graph, and refuses the
-      whole file where it is missing ("which does not exist"). It finds a path relative to the description and
-      a ``file://`` path. It finds a ``package://`` path only if the program added the package to the parser
-      (``parser.package_map().Add(name, folder)``), which the documented call does not do.
-    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 do not look for it.
+    - Drake 1.51 looks for the image when it parses the file, with or without a scene graph. If the image is
+      missing, it refuses the file ("which does not exist"). It finds a path relative to the robot file, and a
+      ``file://`` path. It finds a ``package://`` path only if the program added the package to the parser
+      (``parser.package_map().Add(name, folder)``). The documented call does not add packages.
+    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 do not look for the image.
     - The texture of a material inside ``<visual>`` matters in Drake only with a scene graph (DX516).
 
-    What to do: put the image where the description says it is, or give the material a colour.
-
-    ``dynx doctor --fix`` puts a grey colour in place of the texture, unless the material has a colour.
-    ``--choose DX426=keep`` keeps the texture, and Drake refuses the file.
+    What to do: put the image where the file says it is, or give the material a colour. ``dynx doctor --fix``
+    removes the texture. If the material has no colour, it becomes grey. ``--choose DX426=keep`` keeps the
+    texture; Drake then refuses the file.
     """
 
     stage = "reading"
@@ -83,18 +82,18 @@ class MaterialWithoutColour(EditingRule):
     """DX427 material-without-colour: A material of the robot has no name, no colour, or one of the wrong
     form.
 
-    A ``<material>`` directly in the robot defines a colour for its ``<visual>`` elements. Dynamics does not
+    A ``<material>`` directly in ``<robot>`` defines a colour for ``<visual>`` elements. The dynamics does not
     depend on it. But some engines refuse the file:
 
     - Drake 1.51 refuses the file for a material without name ("missing a required name"), and for one without
       colour and texture ("has no color or texture information"). It also refuses an ``rgba`` that is not four
       numbers.
-    - MuJoCo 4.0 refuses the file for a ``<color>`` whose ``rgba`` is missing or not four numbers, in
-      ``<visual>`` too. It needs neither colour nor name.
+    - MuJoCo 4.0 refuses a ``<color>`` whose ``rgba`` is missing or not four numbers, also in ``<visual>``. It
+      accepts a material without colour or name.
     - Pinocchio 4.1 and PyBullet 3.2.7 accept all of these.
 
-    What to do: write the name and the colour. ``dynx doctor --fix`` writes grey for a missing colour or one
-    of the wrong form, and removes a material without name, which nothing can refer to.
+    What to do: write the name and the colour. ``dynx doctor --fix`` writes grey in place of a missing or
+    wrong colour. It removes a material without name, because no other element can use it.
     """
 
     stage = "reading"

@@ -26,18 +26,19 @@ from dynx.rules.numbers_in_text import decimal
 class MimicOfNothing(EditingRule):
     """DX208 mimic-of-nothing: A mimic joint has nothing to follow.
 
-    It names no joint, a missing joint or its own joint; or it belongs to a fixed joint.
+    There are four cases: ``<mimic>`` names no joint, a missing joint, or its own joint; or it belongs to a
+    fixed joint.
 
-    - Drake 1.51 refuses the file in all these cases, with the line.
-    - Pinocchio 4.1 refuses a ``<mimic>`` without the attribute ``joint``, MuJoCo 4.0 that and a joint that
-      mimics itself.
-    - Otherwise MuJoCo warns and lets the joint move freely, as Pinocchio and PyBullet 3.2.7 do with every
-      mimic joint by default.
+    - Drake 1.51 refuses the file in all four cases, and names the line.
+    - Pinocchio 4.1 and MuJoCo 4.0 refuse a ``<mimic>`` without the attribute ``joint``. MuJoCo also refuses a
+      joint that mimics itself.
+    - In the other cases MuJoCo prints a warning, and the joint moves freely. In Pinocchio and PyBullet 3.2.7
+      every mimic joint moves freely by default.
 
-    dynx reads a joint that follows a missing joint as moving freely, and refuses a joint that follows itself.
+    In dynx, a joint that follows a missing joint moves freely. dynx refuses a joint that follows itself.
 
-    What to do: name the joint to follow, or remove the tag. ``dynx doctor --fix`` corrects a misspelled name
-    of the attribute, ``<mimic jiont="finger"/>``. Otherwise it removes the tag, so that the joint moves
+    What to do: name the joint to follow, or remove ``<mimic>``. ``dynx doctor --fix`` corrects a misspelled
+    attribute, such as ``<mimic jiont="finger"/>``. Otherwise it removes ``<mimic>``, so that the joint moves
     freely, as in the engines that load the file.
     """
 
@@ -85,19 +86,20 @@ def _why_nothing(case: Case, joint: SourceElement, mimic: SourceElement) -> str 
 class MimicOfFixedJoint(EditingRule):
     """DX209 mimic-of-fixed-joint: A mimic joint follows a joint that cannot move.
 
-    The joint it follows was made fixed (a gripper that is not used, say) and the followers were forgotten. By
-    the definition of ``<mimic>`` they cannot move either: their value is the offset.
+    Usually someone made the leading joint fixed, for example in a gripper that is not used, and forgot the
+    followers. By the definition of ``<mimic>``, a follower of a fixed joint cannot move: its position is the
+    offset.
 
     - Drake 1.51 refuses the file: a joint with one coordinate cannot mimic a joint without coordinates.
-    - MuJoCo 4.0 warns and lets the joint move freely.
-    - Pinocchio 4.1 and PyBullet 3.2.7 let every mimic joint move freely by default, and Pinocchio with
-      ``mimic=True`` refuses the file.
+    - MuJoCo 4.0 prints a warning, and the joint moves freely.
+    - In Pinocchio 4.1 and PyBullet 3.2.7 every mimic joint moves freely by default. With ``mimic=True``
+      Pinocchio refuses the file.
 
-    dynx reads the joint as fixed at its offset. The effect in the other engines is one coordinate more in
-    every vector and matrix.
+    dynx reads the joint as fixed at its offset. The effect: in the other engines, every vector and matrix has
+    one coordinate more.
 
-    What to do: make the joint fixed. ``dynx doctor --fix`` does so, and moves its origin by the offset. If it
-    was meant to move by itself, ``--choose DX209=free`` removes ``<mimic>`` instead.
+    What to do: make the joint fixed. ``dynx doctor --fix`` makes it fixed, and moves its origin by the
+    offset. If the joint should move by itself, ``--choose DX209=free`` removes ``<mimic>`` instead.
     """
 
     advice = "Make the follower fixed too."
@@ -139,15 +141,17 @@ class MimicOfFixedJoint(EditingRule):
 class MimicChain(EditingRule):
     """DX511 mimic-chain: A mimic joint follows a joint that is itself a mimic joint.
 
-    ``<mimic>`` is meant to name a joint that moves by itself. Where it names a follower, dynx multiplies the
-    factors along the chain, as the definition says, and so does joint_state_publisher. Pinocchio 4.1 refuses
-    such a file with ``mimic=True`` ("Mimicking and mimicked configuration spaces have different sizes").
-    Without it, as by default, and in PyBullet all the joints are free. MuJoCo makes one equality constraint
-    for each follower, which its solver satisfies only approximately.
+    A *follower* is a mimic joint. ``<mimic>`` should name a joint that moves by itself. If it names another
+    follower, dynx and joint_state_publisher multiply the factors along the chain, as the definition of
+    ``<mimic>`` says. Pinocchio 4.1 with ``mimic=True`` refuses such a file ("Mimicking and mimicked
+    configuration spaces have different sizes"). By default all these joints are free in Pinocchio, and in
+    PyBullet, too. MuJoCo adds an equality constraint for each follower, which its solver satisfies only
+    approximately.
 
     What to do: let each follower name the first joint of its chain, with the product of the multipliers and
-    the combined offset. The value is m2 (m1 x + b1) + b2 = (m2 m1) x + (m2 b1 + b2). It is the same robot.
-    ``dynx doctor --fix`` does so with ``--choose DX511=direct``, and by default leaves the chain.
+    the combined offset. The position is m2 (m1 x + b1) + b2 = (m2 m1) x + (m2 b1 + b2), so the robot is the
+    same. By default ``dynx doctor --fix`` leaves the chain. With ``--choose DX511=direct`` it writes these
+    numbers.
     """
 
     kind = "practice"
@@ -183,14 +187,15 @@ class MimicBeyondLimits(Rule):
     """DX512 mimic-beyond-limits: A mimic joint leaves its own limits while the joint it follows stays within
     its own.
 
-    The leader has a range, multiplier and offset map it to a range of the follower, and the follower's own
-    ``<limit>`` is smaller. One of the four numbers is wrong.
+    The multiplier and the offset map the range of the leading joint to a range of the follower. This range is
+    larger than the follower's own ``<limit>``. So one of these numbers is wrong: a limit, the multiplier or
+    the offset.
 
-    Some engines keep the limits and the coupling as constraints (MuJoCo, Drake in discrete time). They stop
-    the leader short of its own limit, where the two constraints oppose each other. An engine that only
-    computes dynamics has no stop. The equations of motion are the same with all.
+    In some engines the limits and the coupling are constraints (MuJoCo, Drake in discrete time). In these
+    engines the follower's limit stops the leading joint before its own limit. The equations of motion are the
+    same in all engines.
 
-    The file does not say which of the numbers is wrong, so no edit removes the cause.
+    The file does not say which number is wrong, so no edit removes the cause.
     """
 
     kind = "practice"

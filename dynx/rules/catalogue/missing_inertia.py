@@ -66,16 +66,17 @@ class LinkWithoutInertial(Rule):
     - MuJoCo 4.0.0: the mass of the primitive collision shapes of the link at 1000 kg/m^3; without such shapes
       no mass.
 
-    The effect is large: torques, mass matrices and accelerations are off by 10 % to many times their size
-    wherever such a link moves. With a floating base, the root counts, too. With a fixed base, the root and
-    the links rigidly connected to it cannot move. Their mass has no effect, so the report does not list them.
+    The effect is large: torques, mass matrices and accelerations are off by 10 % to many times their size if
+    the link moves. With a floating base, the root link moves, too. With a fixed base, the root link and the
+    links rigidly connected to it cannot move. Their mass has no effect, so the report does not list them.
 
-    What to do: write the mass and the inertia of the link. If it is only a frame, write zeros explicitly.
+    What to do: write the mass and the inertia of the link. If the link is only a frame, write zeros.
 
-    ``dynx doctor --fix`` puts an ``<inertial>`` with mass 0 and moments 0 into each such link. All four
-    engines then read the link as a frame, as Pinocchio does. On the floating base a root without
-    ``<inertial>`` gets that of the heaviest link rigidly connected to it instead, because PyBullet fixes a
-    root without mass to the world (DX107). This changes no equation of motion.
+    ``dynx doctor --fix`` writes an ``<inertial>`` with mass 0 and moments 0 into each such link. All four
+    engines then read the link as a frame, as Pinocchio does. A root link of a floating base is an exception,
+    because PyBullet fixes a root without mass to the world (DX107). This root gets the inertia of the
+    heaviest link that is rigidly connected to it, and that link gets zeros. This changes no equation of
+    motion.
     """
 
     engines = measured_on("pybullet", "mujoco")
@@ -116,24 +117,25 @@ class MasslessRoot(Rule):
     """DX107 massless-root: With a floating base PyBullet fixes a robot to the world if its root link has no
     mass.
 
-    Many robots begin with an empty link, such as ``base_link``, which carries the body by a fixed joint. With
-    a fixed base this is harmless. With a floating base, the root is the body that moves:
+    In many robots the root link is empty, such as ``base_link``, and a fixed joint connects it to the body of
+    the robot. With a fixed base this is harmless. With a floating base, the root moves:
 
     - PyBullet 3.2.7 reads mass 0 as "fixed to the world", also with ``useFixedBase=False``: the robot hangs
       in the air, and its base has no coordinates.
-    - MuJoCo 4.0.0 merges links rigidly connected to the root into the root, so it is not affected. Without
-      such links it refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL").
+    - MuJoCo 4.0.0 merges the root with the links that are rigidly connected to it, so it is not affected. If
+      there are no such links, it refuses the file ("mass and inertia of moving bodies must be larger than
+      mjMINVAL").
     - Pinocchio 4.1.0 and Drake 1.51.1 are not affected.
 
-    The effect: in PyBullet there is no floating robot at all.
+    The effect: in PyBullet the robot does not float.
 
     What to do: give the root the mass of the body that it represents.
 
-    ``dynx doctor --fix`` merges one link into the root: the heaviest link that is rigidly connected to the
-    root, directly or by a chain of fixed joints. This link gets a zero inertial and keeps its name and its
-    place. It is the same rigid body. If no link rigidly connected to the root has mass, the root gets 2e-15
-    kg and 1.5e-14 kg m^2. All engines accept these numbers, which are too small to show in any result.
-    ``--choose DX107=keep`` leaves the root unchanged. A robot without any mass has no inertial data (DX118).
+    ``dynx doctor --fix`` moves the inertia of one link to the root: the heaviest link that is rigidly
+    connected to the root. This link gets a zero inertia, and keeps its name and its place. The equations of
+    motion are the same. If no link rigidly connected to the root has mass, the root gets 2e-15 kg and 1.5e-14
+    kg m^2. All engines accept these numbers, which are too small to show in any result. ``--choose
+    DX107=keep`` leaves the root unchanged. A robot in which no link has mass is DX118.
     """
 
     engines = measured_on("pybullet")
@@ -175,25 +177,24 @@ _READINGS_OF_TENSOR = (("mujoco", "dropped or refused by MuJoCo"), ("drake", "1 
 class MasslessLinkWithInertia(Rule):
     """DX108 massless-link-with-inertia: A link of mass zero has moments of inertia, which no body has.
 
-    A body with moments of inertia has mass. A file can contradict this: the mass of a foot or a sensor was
-    set to zero and its tensor was kept.
+    A body with moments of inertia has mass. Such a file mostly comes from an edit: the mass of a foot or a
+    sensor was set to zero, and its tensor was kept.
 
-    - Drake 1.51.1 makes the link weigh 1 kg, with a warning ("condition 'mass > 0' failed").
-    - MuJoCo 4.0.0 drops the tensor where the link is rigidly connected to another (its default
-      ``fusestatic``), and refuses the file where a joint carries the link. Where the link cannot move, such
-      as the root of a fixed robot, it refuses a tensor that no body can have ("inertia must satisfy A + B >=
-      C").
+    - Drake 1.51.1 gives the link a mass of 1 kg, with a warning ("condition 'mass > 0' failed").
+    - MuJoCo 4.0.0 drops the tensor if the link is rigidly connected to another link (its default
+      ``fusestatic``). It refuses the file if a joint moves the link by itself. If the link cannot move, it
+      refuses only a tensor that no body can have ("inertia must satisfy A + B >= C").
     - Pinocchio 4.1.0 and PyBullet 3.2.7 use the numbers unchanged, as dynx does.
 
-    The effect: in Drake torques up to 23 times too large (bolt, whose feet these are), in MuJoCo as much as
-    the tensor contributes (1e-4 on bolt).
+    The effect on the robot bolt, whose feet have no mass: in Drake torques are up to 23 times too large, and
+    in MuJoCo the error is 1e-4.
 
     What to do: give the link its mass.
 
-    ``dynx doctor --fix`` adds the tensor to that of a link with mass that is rigidly connected to it, its
-    parent first. The massless link gets a zero tensor. That is the same rigid body. Where there is no such
-    link, the link gets a mass of 2e-15 kg, which every engine accepts as mass and which is too little to show
-    in any result. The tensor of a link that cannot move becomes zero.
+    ``dynx doctor --fix`` adds the tensor to the tensor of a link with mass that is rigidly connected to this
+    link, if possible its parent. The massless link gets a zero tensor. The equations of motion are the same.
+    If there is no such link, the massless link gets a mass of 2e-15 kg. Every engine accepts this mass, which
+    is too small to show in any result. If the massless link cannot move, its tensor becomes zero.
     """
 
     engines = measured_on("drake", "mujoco")
@@ -244,10 +245,11 @@ class MasslessMovingLink(Rule):
     carries others.
 
     Links without mass between two joints are common: a shoulder of three axes is mostly written as three
-    joints with two empty links between them. The motion is well defined, because they carry a link with mass.
+    joints with two empty links between them. The motion is well defined, because the last joint carries a
+    link with mass.
 
-    - MuJoCo 4.0.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL"). Links
-      rigidly connected to the link count with it.
+    - MuJoCo 4.0.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL"), unless
+      a link with mass is rigidly connected to the empty link.
     - Pinocchio 4.1.0, PyBullet 3.2.7 and Drake 1.51.1 accept such links.
 
     The effect: the file does not load in MuJoCo.
@@ -255,8 +257,8 @@ class MasslessMovingLink(Rule):
     What to do: the robot is correct. For MuJoCo, give the link a mass that is too small to measure.
 
     ``dynx doctor --fix`` gives the link 2e-15 kg and 1.5e-14 kg m^2 about every axis, just above the smallest
-    that MuJoCo accepts. In a robot of kilograms and metres that is below rounding. Choose
-    ``--choose DX110=keep`` to keep the file. Where nothing beyond the joint has mass, see DX113.
+    numbers that MuJoCo accepts. In a robot of kilograms and metres these numbers have less effect than
+    rounding. ``--choose DX110=keep`` keeps the file. If no link beyond the joint has mass, see DX113.
     """
 
     engines = measured_on("mujoco")
@@ -283,25 +285,26 @@ class MasslessMovingLink(Rule):
 class MassMatrixSingular(Rule):
     """DX113 mass-matrix-singular: Nothing beyond a joint has mass, so the mass matrix is singular.
 
-    At the end of some chains there are links whose inertia was never entered: fingers, wheels, rotating
-    sensors. They move without any torque, so their acceleration is undefined: the mass matrix is singular,
-    and forward dynamics has no solution.
+    In some files the last links of a chain have no inertia, such as fingers, wheels and rotating sensors. No
+    torque is needed to move them, so their acceleration is undefined: the mass matrix is singular, and
+    forward dynamics has no unique solution.
 
-    - Pinocchio 4.1.0 gives NaN for all joints.
-    - PyBullet 3.2.7 gives that joint an acceleration of zero, and the others the right one.
+    - Pinocchio 4.1.0 returns NaN for all joints.
+    - PyBullet 3.2.7 returns an acceleration of zero for such a joint, and the right acceleration for all
+      other joints.
     - Drake 1.51.1 raises an error ("mass matrix ... is not positive-definite").
     - MuJoCo 4.0.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL").
-    - Kinematics, mass matrix and inverse dynamics are right in the first three.
+    - Kinematics, mass matrix and inverse dynamics are right in Pinocchio, PyBullet and Drake.
 
-    The effect: no forward dynamics, which each engine reports in a different way. 24 joints of romeo are like
-    this.
+    The effect: there is no forward dynamics, and each engine reports this in a different way. The robot romeo
+    has 24 such joints.
 
     What to do: enter the inertia. If the joint does not matter, make it fixed.
 
     ``dynx doctor --fix`` gives such links 2e-15 kg and 1.5e-14 kg m^2 about every axis, the least that all
-    engines accept. Then all give the same accelerations, to rounding. The report says that the physics
-    changed: the inertia is invented, and the smallest torque accelerates it strongly. ``--choose DX113=keep``
-    keeps the file.
+    engines accept. All engines then return the same accelerations, to rounding. The report says that the
+    physics changed: this inertia is invented, and a very small torque causes a very large acceleration.
+    ``--choose DX113=keep`` keeps the file.
     """
 
     # The others show it in forward dynamics, which has no right value to compare with.
@@ -331,26 +334,26 @@ class MassMatrixSingular(Rule):
 class NoInertialData(Rule):
     """DX118 no-inertial-data: Nothing that moves has mass or inertia, so there is no dynamics to compare.
 
-    Descriptions for display, for motion planning or from a CAD export without materials often have no
-    ``<inertial>`` at all, or zeros in all of them. Such a file states the kinematics of a robot and nothing
-    about its dynamics:
+    Files for display, for motion planning or from a CAD export without materials often have no
+    ``<inertial>``, or only zeros in each ``<inertial>``. Such a file states the kinematics of a robot and
+    nothing about its dynamics:
 
     - Pinocchio 4.1.0 and Drake 1.51.1 load it with a mass matrix of zero. Pinocchio then gives NaN for
       accelerations, and Drake an error.
-    - PyBullet 3.2.7 gives 1 kg and 1 kg m^2 about every axis to each link without ``<inertial>``. It fixes a
-      floating robot to the world if the root has an ``<inertial>`` of zero.
+    - PyBullet 3.2.7 gives 1 kg and 1 kg m^2 about every axis to each link without ``<inertial>``. If the root
+      has an ``<inertial>`` of zero, PyBullet fixes a floating robot to the world.
     - MuJoCo 4.0.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL"), unless
       collision shapes other than meshes give the links a mass.
 
-    The effect: no torque, mass matrix or acceleration of this robot means anything in any engine. Poses and
-    Jacobians do, and they are compared.
+    The effect: torques, mass matrices and accelerations of this robot have no meaning in any engine. The
+    doctor compares only poses and Jacobians.
 
     What to do: enter the masses and inertias, from the data sheet or the CAD model.
 
-    ``dynx doctor --fix`` invents no inertia, and the file is not called alike. ``--choose DX118=least`` gives
-    every moving body 2e-15 kg and 1.5e-14 kg m^2, with which all engines load the file. Do not simulate the
-    result: a torque of 1e-6 N m then turns a joint at millions of rad/s. A single moving part without mass is
-    DX110 or DX113.
+    ``dynx doctor --fix`` does not invent inertias. The report does not call the engines alike. ``--choose
+    DX118=least`` gives every moving body 2e-15 kg and 1.5e-14 kg m^2, with which all engines load the file.
+    Do not simulate the result: a torque of 1e-6 N m accelerates a joint to millions of rad/s. If only some
+    moving links have no mass, see DX110 and DX113.
     """
 
     engines = measured_on("pybullet", "mujoco")
@@ -394,21 +397,21 @@ class NoInertialData(Rule):
 class NegativeMass(EditingRule):
     """DX120 negative-mass: The mass of a link is negative.
 
-    No body has a negative mass. It comes from an edit by hand, from an exporter that subtracts a hole, or
-    from a "correction" that makes the sum of several links right.
+    No body has a negative mass. A negative mass comes from an edit by hand, from an exporter that subtracts a
+    hole, or from a "correction" of the total mass of several links.
 
-    For a link that moves, measured:
+    If the link moves:
 
-    - Pinocchio 4.1 adds inertias and divides their first moment by the larger of the mass and 2e-16 kg. The
-      centre of mass of the link is then 1e20 m away or more, and torques are beyond 1e40 N m.
+    - Pinocchio 4.1 adds inertias, and divides their first moment by the larger of the mass and 2e-16 kg. The
+      centre of mass of the link is then at a distance of 1e20 m or more, and torques are above 1e40 N m.
     - PyBullet 3.2.7 loads the file, and inverse dynamics and the mass matrix fail ("invalid mass").
     - MuJoCo 4.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL").
     - Drake 1.51 replaces the inertia by that of a ball of water of 1 kg, with a warning.
 
-    dynx refuses the file, with the line.
+    dynx refuses the file, and names the line.
 
-    What to do: enter the mass of the body. ``dynx doctor --fix`` removes the sign, which is a guess that the
-    report names. ``--choose DX120=zero`` writes 0 instead.
+    What to do: enter the mass of the body. ``dynx doctor --fix`` removes the sign. This is a guess, and the
+    report says so. ``--choose DX120=zero`` writes 0 instead.
     """
 
     stage = "reading"
@@ -445,12 +448,12 @@ class MissingProductOfInertia(EditingRule):
     - MuJoCo 4.0 refuses the file and names the line.
     - PyBullet 3.2.7 and Drake 1.51 read zero.
 
-    The effect is a link without moments of inertia in Pinocchio: of order 0.01 to 1 in the mass matrix.
+    The effect in Pinocchio is a link without moments of inertia. The relative error of the mass matrix is of
+    order 0.01 to 1.
 
-    What to do: write the products that are zero as ``0``. ``dynx doctor --fix`` does so. Two engines read a
-    missing product as zero. A number under a misspelled name, ``iyx="0.01"``, is what was meant, and gets the
-    right name. A missing moment (``ixx``, ``iyy``, ``izz``) is DX410: no body has a zero moment, and the file
-    does not contain the number.
+    What to do: write all six numbers. ``dynx doctor --fix`` corrects a misspelled name, such as
+    ``iyx="0.01"``. For a missing product it writes ``0``. For a missing moment (``ixx``, ``iyy``, ``izz``)
+    see DX410.
     """
 
     stage = "reading"
@@ -470,24 +473,25 @@ class MissingProductOfInertia(EditingRule):
 class IncompleteInertial(EditingRule):
     """DX410 incomplete-inertial: An inertial has no mass or no inertia tensor.
 
-    ``<inertial>`` needs both ``<mass value="..."/>`` and ``<inertia .../>``. Often ``<mass>2.5</mass>`` was
-    written, which looks right but which no engine reads. A tensor without ``ixx``, ``iyy`` or ``izz`` is
-    none: ``<inertia/>`` is what is left of a template.
+    ``<inertial>`` needs both ``<mass value="..."/>`` and ``<inertia .../>``. A common mistake is
+    ``<mass>2.5</mass>``, which no engine reads. A tensor without ``ixx``, ``iyy`` or ``izz`` also counts as
+    missing, such as an ``<inertia/>`` that remained from a template.
 
-    - Pinocchio 4.1 reports that on stderr. Without a mass it drops the whole inertial, so the link weighs
-      nothing. Without a tensor the link is a point mass.
+    - Pinocchio 4.1 prints a line on stderr. Without a mass it drops the whole inertial, so the link has no
+      mass. Without a tensor the link is a point mass.
     - PyBullet 3.2.7 and MuJoCo 4.0 refuse the file.
     - Drake 1.51 reads missing parts as zero: a link with a mass and no tensor is a point mass. An
-      ``<inertial>`` with a tensor and no mass is impossible. Drake warns and replaces it.
+      ``<inertial>`` with a tensor and no mass is physically impossible; Drake prints a warning and replaces
+      it.
 
-    The effect is a file that does not load, or a link without its mass: of order 0.01 to 1 in the mass
-    matrix.
+    The effect is a file that does not load, or a link without its mass. The relative error of the mass matrix
+    is then of order 0.01 to 1.
 
-    What to do: complete it. A number under a misspelled name, ``<mass valeu="1.5"/>`` or ``ixxx="0.02"``, is
-    what was meant. ``dynx doctor --fix`` corrects the name. Otherwise it can only guess, and the report says
-    so. A number between the tags, ``<mass>2.5</mass>``, is the mass. A tensor without mass is dropped, so the
-    link weighs nothing. A mass without tensor stays as a point mass at the origin of the inertial, as in
-    Pinocchio and Drake. ``--choose DX410=weightless`` drops that mass too.
+    What to do: complete the ``<inertial>``. ``dynx doctor --fix`` corrects a misspelled name, such as ``<mass
+    valeu="1.5"/>`` or ``ixxx="0.02"``. In other cases it guesses, and the report says so. It reads the number
+    in ``<mass>2.5</mass>`` as the mass. It drops a tensor without mass, so the link has no mass. A mass
+    without tensor becomes a point mass at the origin of the inertial, as in Pinocchio and Drake. ``--choose
+    DX410=weightless`` drops this mass, too.
     """
 
     stage = "reading"

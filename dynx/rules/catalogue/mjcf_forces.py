@@ -15,22 +15,22 @@ class ArmatureInMassMatrix(CallingRule):
     """DX309 armature-in-mass-matrix: A joint has an armature, which some engines add to the mass matrix and
     others leave out.
 
-    ``<joint armature="0.01"/>`` of MJCF is the inertia of a rotor, as it acts at the joint. SDF has it as
-    ``<drake:rotor_inertia>``, behind a gear of ``<drake:gear_ratio>``.
+    ``<joint armature="0.01"/>`` in MJCF is the armature: the inertia of a rotor as it acts at the joint. In
+    SDF it follows from ``<drake:rotor_inertia>`` and ``<drake:gear_ratio>``.
 
-    - MuJoCo 4.0 adds it to the diagonal of the mass matrix, and to inverse and forward dynamics.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) keeps it in ``model.armature``, which ``crba``, ``rnea`` and
-      ``aba`` add, too.
-    - Drake 1.51 adds it where the joint has an actuator (``<motor joint="..."/>``), and else drops it.
+    - MuJoCo 4.0 adds the armature to the diagonal of the mass matrix, and to inverse and forward dynamics.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) keeps it in ``model.armature``; ``crba``, ``rnea`` and ``aba``
+      add it, too.
+    - Drake 1.51 adds it if the joint has an actuator (``<motor joint="..."/>``), and otherwise drops it.
     - PyBullet 3.2.7 (``loadMJCF``) drops it.
 
-    The effect is the armature itself. For a geared arm it is often as large as the inertia of the links, and
-    controllers tuned with it are unstable without.
+    The effect is as large as the armature. In an arm with gears it is often as large as the inertia of the
+    links. A controller that was tuned with armature can be unstable without it.
 
-    What to do: decide whether the rotors belong to your robot, and set them in each engine. The file is
-    correct, so ``dynx doctor --fix`` does not change it. dynx reads the armature, and its quantities have it
-    with ``joint_dynamics=True``. doctor compares the rigid bodies alone, and prints the calls that remove the
-    armature from each engine.
+    What to do: decide whether your robot model includes the rotors, and set the armature in each engine. The
+    file is correct, so ``dynx doctor --fix`` does not change it. dynx reads the armature, and its quantities
+    include it with ``joint_dynamics=True``. The doctor compares the rigid bodies alone, and prints the calls
+    that remove the armature from each engine.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf", "sdf")
@@ -53,19 +53,18 @@ class SpringInInverseDynamics(CallingRule):
     """DX310 spring-in-inverse-dynamics: A joint has a spring, which MuJoCo adds to the torque and others
     drop.
 
-    ``<joint stiffness="5" springref="0.1"/>`` pulls the joint to its reference.
+    ``<joint stiffness="5" springref="0.1"/>`` is a spring that pulls the joint to the position ``springref``.
 
-    - MuJoCo 4.0 has the force of the spring in ``mj_inverse`` and ``mj_forward``, and the armature of a
-      spring that is integrated implicitly.
-    - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) drop it without a
-      message.
+    - MuJoCo 4.0 includes the force of the spring in ``mj_inverse`` and ``mj_forward``.
+    - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) drop the spring
+      without a message.
 
-    The effect is the stiffness times the distance from the reference. A leg that stands on its springs in
-    MuJoCo falls in the others.
+    The effect is the stiffness times the distance from ``springref``. A leg that stands on its springs in
+    MuJoCo falls in the other engines.
 
-    What to do: add the force of the spring to your controller where the engine has none. The file is
-    correct, so ``dynx doctor --fix`` does not change it. dynx reads the spring, and its quantities have it
-    with ``joint_dynamics=True``. doctor compares the rigid bodies alone, and prints the call that switches
+    What to do: if an engine drops the spring, add its force to your controller. The file is correct, so
+    ``dynx doctor --fix`` does not change it. dynx reads the spring, and its quantities include it with
+    ``joint_dynamics=True``. The doctor compares the rigid bodies alone, and prints the call that switches
     springs off in MuJoCo.
     """
 
@@ -89,17 +88,17 @@ class SpringInInverseDynamics(CallingRule):
 class GravityCompensation(CallingRule):
     """DX311 gravity-compensation: The weight of a body is compensated, by MuJoCo alone.
 
-    ``<body gravcomp="1"/>`` is a force against the weight of the body.
+    ``<body gravcomp="1"/>`` is a force that cancels the weight of the body (``0.5`` cancels half of it).
 
-    - MuJoCo 4.0 applies it as a passive force, in ``mj_inverse`` and in ``mj_forward``.
+    - MuJoCo 4.0 applies this force in ``mj_inverse`` and in ``mj_forward``.
     - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) drop it without a
-      message: there the arm hangs down that floats in MuJoCo.
+      message. An arm that floats in MuJoCo hangs down in these engines.
 
-    The effect is the share of the weight that is compensated, for most arms all of it.
+    The effect is the share of the weight that MuJoCo cancels, in most arms all of it.
 
-    What to do: compensate the weight by your controller, by the gravity torque of the model. The file is
-    correct, so ``dynx doctor --fix`` does not change it. dynx does not read it and says so in the notes of
-    the model. The doctor prints the call that switches the compensation off in MuJoCo.
+    What to do: compensate the weight by your controller, with the gravity torque of the model. The file is
+    correct, so ``dynx doctor --fix`` does not change it. dynx ignores the attribute, with a note in
+    ``model.notes``. The doctor prints the call that switches the compensation off in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -122,18 +121,19 @@ class GravityCompensation(CallingRule):
 class TendonForces(CallingRule):
     """DX312 tendon-forces: A tendon pulls at joints, in MuJoCo alone.
 
-    ``<tendon>`` holds fixed tendons, which couple joints, and spatial ones, which run over sites and geoms.
-    Their stiffness, damping, dry friction, armature and limits are forces at the joints.
+    ``<tendon>`` contains fixed tendons, which couple joints, and spatial tendons, which run over sites and
+    geoms. The stiffness, damping, dry friction, armature and limits of a tendon cause forces at the joints.
 
-    - MuJoCo 4.0 has these forces in ``mj_inverse`` and ``mj_forward``.
+    - MuJoCo 4.0 includes these forces in ``mj_inverse`` and ``mj_forward``.
     - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) drop tendons, Drake
       with a warning.
 
-    The effect is the force of the tendon. Hands whose fingers close by tendons do not close elsewhere.
+    The effect is the force of the tendon. If tendons close the fingers of a hand, the fingers close only in
+    MuJoCo.
 
-    What to do: write the forces of the tendons into your controller where an engine has none. The file is
-    correct, so ``dynx doctor --fix`` does not change it. dynx does not read tendons, and says so in the notes
-    of the model. The doctor prints the call that switches their forces off in MuJoCo.
+    What to do: if an engine drops tendons, add their forces to your controller. The file is correct, so
+    ``dynx doctor --fix`` does not change it. dynx ignores tendons, with a note in ``model.notes``. The doctor
+    prints the call that switches the forces of tendons off in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -155,19 +155,20 @@ class TendonForces(CallingRule):
 class ActuatorForces(CallingRule):
     """DX313 actuator-forces: Actuators act on the joints without a command, in MuJoCo alone.
 
-    ``<position joint="elbow" kp="100"/>`` holds the joint at the command, which is 0 in a new ``MjData``.
-    Other actuators with a bias (``velocity``, ``intvelocity``, ``general``, ``muscle``) do likewise.
+    ``<position joint="elbow" kp="100"/>`` holds the joint at the command. Without a command, it holds the
+    joint at 0, because the command is 0 in a new ``MjData``. Other actuators can also act without a command
+    (``velocity``, ``intvelocity``, ``general``, ``muscle``).
 
-    - MuJoCo 4.0 adds the force to forward dynamics, also where ``data.ctrl`` was never set. ``mj_inverse``
-      does not subtract it.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) drop actuators. Drake 1.51
-      makes an actuator without a controller.
+    - MuJoCo 4.0 adds the force of the actuator to forward dynamics, even if your program never sets
+      ``data.ctrl``. ``mj_inverse`` does not subtract it.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) drop actuators. Drake 1.51 adds
+      an actuator without a controller.
 
-    The effect is the force of the actuator: gain times the distance from 0.
+    The effect is the force of the actuator. For ``position`` it is the gain times the distance from 0. So
+    MuJoCo holds the robot, and in the other engines it falls.
 
-    What to do: know that a robot with such actuators is held in MuJoCo and falls elsewhere. Port the gains
-    into your controller. The file is correct, so ``dynx doctor --fix`` does not change it. doctor compares
-    without actuators, and prints the call that switches them off.
+    What to do: write the gains into your controller. The file is correct, so ``dynx doctor --fix`` does not
+    change it. The doctor compares without actuators, and prints the call that switches them off in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -189,21 +190,22 @@ class ActuatorForces(CallingRule):
 class EqualityAsConstraint(CallingRule):
     """DX314 equality-as-constraint: An equality constraint closes a loop or couples joints in some engines.
 
-    ``<equality>`` holds ``connect``, ``weld``, ``joint`` and others, which MuJoCo makes soft constraints.
+    ``<equality>`` contains ``connect``, ``weld``, ``joint`` and other elements, which are soft constraints in
+    MuJoCo.
 
-    - MuJoCo 4.0 adds their forces to ``mj_inverse`` and ``mj_forward``, wherever they are violated: a
-      thousand times the torque of the rigid bodies was measured.
-    - Drake 1.51 makes a constraint of ``connect`` and ``weld`` with which a continuous plant computes no
-      forward dynamics. Its inverse dynamics ignores the constraint, as for an open tree. It drops others with
+    - MuJoCo 4.0 adds the forces of these constraints to ``mj_inverse`` and ``mj_forward`` if the state
+      violates them. The force can be a thousand times the torque of the rigid bodies.
+    - Drake 1.51 adds a constraint for ``connect`` and ``weld``. A continuous plant with this constraint
+      computes no forward dynamics. Inverse dynamics ignores the constraint. Drake drops other elements, with
       a warning.
     - Pinocchio 4.1: ``buildModelFromMJCF`` leaves loops open. ``buildModelAndConstraintsFromMJCF`` returns
-      the constraints apart. PyBullet 3.2.7 (``loadMJCF``) drops them.
+      the constraints separately. PyBullet 3.2.7 (``loadMJCF``) drops them.
 
-    Without its constraints a robot with closed loops, such as a Cassie, is another robot.
+    The effect is large in robots with closed loops, such as Cassie.
 
-    What to do: close the loops in each engine by its own means. The file is correct, so ``dynx doctor
-    --fix`` does not change it. doctor compares the open tree, and prints the calls that switch the
-    constraints off.
+    What to do: close the loops in each engine by the constraints of this engine. The file is correct, so
+    ``dynx doctor --fix`` does not change it. The doctor compares the open tree, and prints the calls that
+    switch the constraints off.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -224,16 +226,18 @@ class EqualityAsConstraint(CallingRule):
 class FluidForces(CallingRule):
     """DX315 fluid-forces: The file states a medium, whose drag MuJoCo alone adds.
 
-    ``<option density="1.2" viscosity="1.8e-5"/>`` is the medium in which the robot moves.
+    ``<option density="1.2" viscosity="1.8e-5"/>`` states the medium in which the robot moves, such as air or
+    water.
 
     - MuJoCo 4.0 adds drag and viscous forces to every body in ``mj_inverse`` and ``mj_forward``.
     - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) have no medium, and
       drop the attributes without a message.
 
-    The effect grows with speed and with the size of the bodies: a swimmer does not move at all without it.
+    The effect grows with the speed and the size of the bodies. A swimming robot cannot swim without the
+    medium.
 
     What to do: leave the medium out for robots on land. The file is correct, so ``dynx doctor --fix`` does
-    not change it. dynx has no medium, and says so in the notes of the model. The doctor compares without a
+    not change it. dynx ignores the medium, with a note in ``model.notes``. The doctor compares without a
     medium, and prints the call that switches it off in MuJoCo.
     """
 

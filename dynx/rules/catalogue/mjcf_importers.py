@@ -50,16 +50,16 @@ class InertiaByDefaultClass(EditingRule):
 
     ``<default class="part"><geom mass="2"/></default>`` gives a mass to each ``<geom class="part"/>``.
 
-    - MuJoCo 4.0 applies classes to all attributes, and a class has what the classes around it have.
+    - MuJoCo 4.0 applies all attributes of a class. A class inherits the attributes of the class around it.
     - Pinocchio 4.1 (``buildModelFromMJCF``) applies the density and the size of a class, but not its mass,
-      type, place or orientation. The mass of the body then follows from the density of water.
-    - Drake 1.51 loses what a class has from the class around it where a class between them has no ``<geom>``.
-    - PyBullet 3.2.7 (``loadMJCF``) applies little of a class.
+      type, position or orientation. It then computes the mass of the body from the density of water.
+    - Drake 1.51 loses inherited attributes if a class on the way has no ``<geom>``.
+    - PyBullet 3.2.7 (``loadMJCF``) applies only few attributes of a class.
 
-    The effect is the mass of the body, by any factor.
+    The effect: the mass of the body is wrong by any factor.
 
-    What to do: write an ``<inertial>`` for the body. ``dynx doctor --fix`` does so, with the numbers that
-    follow from the geoms by the rules of MuJoCo. All engines read them.
+    What to do: write an ``<inertial>`` for the body. ``dynx doctor --fix`` writes it, with the numbers that
+    MuJoCo computes from the geoms. All engines read it.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -105,14 +105,14 @@ class InertiaByCompilerSetting(EditingRule):
     of them (``settotalmass``).
 
     - MuJoCo 4.0 applies all of these.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) applies the two bounds alone.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) applies only ``boundmass`` and ``boundinertia``.
     - Drake 1.51 applies none of them, and refuses moments that ``balanceinertia`` would replace.
     - PyBullet 3.2.7 (``loadMJCF``) applies none.
 
-    The effect is the change by the setting: with ``settotalmass`` the mass of the whole robot.
+    The effect: engines have other masses or inertias than MuJoCo. ``settotalmass`` changes the mass of the
+    whole robot.
 
-    What to do: write an ``<inertial>`` with the final numbers for each body. ``dynx doctor --fix`` does
-    so.
+    What to do: write an ``<inertial>`` with the final numbers for each body, as ``dynx doctor --fix`` does.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -168,15 +168,15 @@ class OrientationOtherThanQuaternion(EditingRule):
     MJCF has five attributes for an orientation: ``quat``, ``axisangle``, ``euler`` in the sequence
     ``eulerseq``, ``xyaxes`` and ``zaxis``.
 
-    - MuJoCo 4.0 and Drake 1.51 read all of them alike.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) does not normalise the axis of ``axisangle``, and reads capital
-      letters of ``eulerseq`` (axes that stay) as small ones (axes that turn along).
-    - PyBullet 3.2.7 (``loadMJCF``) reads ``quat`` alone as MuJoCo does. It takes angles of ``euler`` with the
-      other sign or as degrees, and drops the rest.
+    - MuJoCo 4.0 and Drake 1.51 read all five in the same way.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) does not normalise the axis of ``axisangle``. In ``eulerseq`` it
+      reads capital letters (fixed axes) as small letters (axes that rotate with the frame).
+    - PyBullet 3.2.7 (``loadMJCF``) reads only ``quat`` as MuJoCo does. It reads angles of ``euler`` with the
+      opposite sign or as degrees, and drops the other three attributes.
 
-    The effect is another pose of the body and of all bodies that it carries.
+    The effect: the body, and all bodies that it carries, have another pose.
 
-    What to do: write ``quat``. ``dynx doctor --fix`` does so.
+    What to do: write ``quat``, as ``dynx doctor --fix`` does.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -208,16 +208,16 @@ class InertiaNotPrincipal(EditingRule):
     """DX611 inertia-not-principal: An ``<inertial>`` of MJCF has products of inertia, which PyBullet
     drops.
 
-    ``fullinertia`` states the six entries of a tensor, ``diaginertia`` three moments about the axes that the
-    orientation of the ``<inertial>`` states.
+    ``fullinertia`` states the six entries of a tensor. ``diaginertia`` states three moments about the axes of
+    the ``<inertial>``.
 
     - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read both.
     - PyBullet 3.2.7 (``loadMJCF``) has an inertial frame and three moments for each body. It reads the
-      orientation, and no tensor: the moments that a program sets afterwards (DX610) are about these axes.
+      orientation of the frame. The remedy of DX610 sets the moments, but no products of inertia.
 
-    The effect is that of the products of inertia.
+    The effect: the products of inertia are lost.
 
-    What to do: write ``diaginertia`` about principal axes. ``dynx doctor --fix`` does so.
+    What to do: write ``diaginertia`` about the principal axes, as ``dynx doctor --fix`` does.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -252,16 +252,18 @@ class SeveralJointsInBody(EditingRule):
     """DX607 several-joints-in-body: A body at some distance from its parent has several joints, which Drake
     places otherwise.
 
-    A body of MJCF may have several joints, which act one after the other: three hinges stand for a wrist.
+    A body of MJCF may have several joints, which act one after the other. For example, three hinges are a
+    wrist.
 
-    - MuJoCo 4.0, Pinocchio 4.1 and PyBullet 3.2.7 (``loadMJCF``) place all of them at the body.
-    - Drake 1.51 adds bodies in between, named ``wrist0`` and ``wrist1``. It places all joints but the last at
-      the origin of the parent, and the whole offset of the body (``pos`` and its orientation) behind them. So
-      the body turns about the origin of its parent.
+    - MuJoCo 4.0, Pinocchio 4.1 and PyBullet 3.2.7 (``loadMJCF``) place all joints at the body.
+    - Drake 1.51 adds bodies between these joints, such as ``wrist0`` and ``wrist1``. It places all joints
+      except the last at the origin of the parent, and the offset of the body (``pos`` and orientation) after
+      them. So the body rotates about the origin of its parent.
 
-    The effect is another pose of the body and of all bodies that it carries.
+    The effect: the body, and all bodies that it carries, have another pose.
 
-    What to do: put the body into one without joints, which has its place. ``dynx doctor --fix`` does so.
+    What to do: write an outer body with the pose and without joints, and an inner body with the joints, as
+    ``dynx doctor --fix`` does.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -292,16 +294,17 @@ class SeveralJointsInBody(EditingRule):
 class FrameOfBodies(Rule):
     """DX608 frame-of-bodies: A ``<frame>`` or ``<replicate>`` holds bodies, which importers leave out.
 
-    ``<frame pos="0 0 1">`` moves all that it holds. ``<replicate count="4" euler="0 0 90">`` repeats it.
+    ``<frame pos="0 0 1">`` moves its contents. ``<replicate count="4" euler="0 0 90">`` repeats its contents.
 
     - MuJoCo 4.0 reads both.
-    - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) skip the element
-      with all bodies, joints and geoms in it. Drake warns.
+    - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) ignore the element
+      with all bodies, joints and geoms in it. Drake prints a warning.
 
-    The robot lacks these bodies, and an engine whose robot lacks a joint cannot be compared.
+    The effect: in these engines the robot lacks the bodies. If it lacks a joint, the doctor does not use the
+    engine.
 
-    What to do: write the bodies with their own poses, as MuJoCo does: ``mj_saveLastXML`` writes the file
-    without frames. Or convert it (``dynx convert --to mjcf``). ``dynx doctor --fix`` does not change it.
+    What to do: write the bodies with their own poses. MuJoCo's ``mj_saveLastXML`` and ``dynx convert --to
+    mjcf`` write such a file. ``dynx doctor --fix`` does not change the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -321,17 +324,17 @@ class FrameOfBodies(Rule):
 class SeveralBodiesInWorld(Rule):
     """DX609 several-bodies-in-world: The world has several bodies, of which Pinocchio loads the first.
 
-    A table, a floor or a second robot may stand beside the robot in ``<worldbody>``.
+    Besides the robot, ``<worldbody>`` may contain a table, a floor or a second robot.
 
-    - MuJoCo 4.0 and Drake 1.51 load all of them.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) loads the first body of the world and what it carries, and drops
-      the others without a message.
-    - PyBullet 3.2.7 (``loadMJCF``) makes a robot of each. ``loadMJCF`` returns several.
+    - MuJoCo 4.0 and Drake 1.51 load all bodies.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) loads the first body of the world and the bodies that it carries.
+      It drops the other bodies without a message.
+    - PyBullet 3.2.7 (``loadMJCF``) loads each body as a robot, and returns several robots.
 
-    Where the table comes first, the robot of Pinocchio has no joint.
+    For example, if the table comes first, the robot in Pinocchio has no joint.
 
-    What to do: put the robot first, or into a file of its own, which the scene includes. The order of
-    bodies is that of the coordinates, so that ``dynx doctor --fix`` does not change it.
+    What to do: put the robot first. Or put it into a file of its own, and include this file in the scene. The
+    order of bodies determines the order of coordinates, so ``dynx doctor --fix`` does not change it.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -357,11 +360,11 @@ class MjcfInSinglePrecision(Rule):
     - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read double precision. MuJoCo holds meshes in single precision.
     - PyBullet 3.2.7 (``loadMJCF``) reads positions, orientations, axes and sizes in single precision.
 
-    The effect is an error of about 1e-8 of every quantity. It is no cause of a fall, and hides other
-    differences from a comparison at 1e-12.
+    The effect: every quantity has an error of about 1e-8. This is too small to see in a simulation. But in a
+    comparison with the tolerance 1e-12, it hides other differences.
 
-    What to do: nothing, or compare with ``--tolerance 1e-6``. No edit that keeps the numbers helps. So the
-    effect in a report is what remains of the difference without all other causes.
+    What to do: nothing, or compare with ``--tolerance 1e-6``. An edit of the file cannot remove the cause. So
+    the report gives as its effect the difference that remains after all other causes are removed.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -391,14 +394,14 @@ class JointByDefaultClass(EditingRule):
     ``<default><joint type="slide" axis="0 0 1"/></default>`` makes every joint slide along z.
 
     - MuJoCo 4.0 and Drake 1.51 apply classes to all attributes of joints.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) does not apply ``pos``, so that the axis passes through the
-      origin of the body.
-    - PyBullet 3.2.7 (``loadMJCF``) applies neither ``type`` nor ``axis``, ``pos`` and ``range``. A joint
-      without a type of its own is no joint there: the body is fixed.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) does not apply ``pos``, so the axis passes through the origin of
+      the body.
+    - PyBullet 3.2.7 (``loadMJCF``) does not apply ``type``, ``axis``, ``pos`` and ``range``. It ignores a
+      joint without a type of its own, so the body is fixed (DX605).
 
-    The effect is another axis, or a joint less.
+    The effect: the joint has another axis, or the robot lacks the joint.
 
-    What to do: write these attributes at the joint. ``dynx doctor --fix`` does so.
+    What to do: write these attributes in the ``<joint>``, as ``dynx doctor --fix`` does.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -423,15 +426,15 @@ class JointByDefaultClass(EditingRule):
 class JointWithoutType(EditingRule):
     """DX605 joint-without-type: A joint states no type, which PyBullet takes for no joint.
 
-    The type of a ``<joint>`` is ``hinge`` unless it is stated, by the joint or its class of defaults.
+    In MJCF the default type of a ``<joint>`` is ``hinge``.
 
     - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read a hinge.
-    - PyBullet 3.2.7 (``loadMJCF``) prints "expected 'type' attribute for joint" and leaves the joint out. Its
-      body is then fixed to the one that carries it.
+    - PyBullet 3.2.7 (``loadMJCF``) prints "expected 'type' attribute for joint" and ignores the joint. Its
+      body is then fixed to its parent.
 
-    Most files state no type for hinges, so that PyBullet loads robots without any joint.
+    Most files state no type for hinges. PyBullet then loads the robot without any joint.
 
-    What to do: write ``type="hinge"``. ``dynx doctor --fix`` does so.
+    What to do: write ``type="hinge"``, as ``dynx doctor --fix`` does.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -456,12 +459,11 @@ class JointWithoutName(EditingRule):
 
     Names of joints are optional in MJCF.
 
-    - MuJoCo 4.0 leaves the joint without a name. It has a number.
-    - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) make names of the
-      names of bodies or of numbers, each in its own way: ``leg_joint_0``, ``trunk-leg``, ``joint2_4_2``.
+    - MuJoCo 4.0 gives the joint only a number.
+    - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) generate different
+      names from the names of bodies or from numbers: ``leg_joint_0``, ``trunk-leg``, ``joint2_4_2``.
 
-    No coordinate of one engine can be found by its name in another one, and code that looks joints up by
-    their names works in one engine alone.
+    A program cannot find the joint by the same name in two engines.
 
     What to do: name every joint. ``dynx doctor --fix`` writes the name that dynx gives the joint.
     """
@@ -496,15 +498,15 @@ class InertiaFromShapesOfMjcf(CallingRule):
 
     - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read both.
     - PyBullet 3.2.7 (``loadMJCF``) reads the mass and the centre of mass. It computes the moments from the
-      bounding box of the shapes. Without shapes they are 0. For a body without ``<inertial>`` it computes the
-      mass from a density of 1000, and does not read ``mass`` of a geom. No flag of ``loadMJCF`` changes that:
-      with ``URDF_USE_INERTIA_FROM_FILE`` all moments are 0.
+      bounding box of the shapes; without shapes they are 0. For a body without ``<inertial>`` it computes the
+      mass from a density of 1000 kg/m^3, and ignores the attribute ``mass`` of a geom. With the flag
+      ``URDF_USE_INERTIA_FROM_FILE`` all moments are 0.
 
-    The effect is the inertia of every body: tens of per cent of the mass matrix for most robots.
+    The effect: every body has another inertia. In most robots the mass matrix is off by tens of per cent.
 
-    What to do: set the masses and the moments of the file after loading, or convert the file to URDF
-    (``dynx convert --to urdf``) and load it with the flag. The file is correct, so ``dynx doctor --fix`` does
-    not change it. The doctor prints the call.
+    What to do: set the masses and the moments after loading, or convert the file to URDF (``dynx convert --to
+    urdf``) and load it with this flag. The file is correct, so ``dynx doctor --fix`` does not change it. The
+    doctor prints the call that sets the masses and the moments.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -557,14 +559,16 @@ def _joints_in_text(case: Case, document: MjcfText) -> Iterator[tuple[BodyInText
 class IncludeOfMjcf(Rule):
     """DX613 include-of-mjcf: The file includes another one, which Pinocchio and PyBullet leave out.
 
-    ``<include file="robot.xml"/>`` stands for what the other file holds. Scenes include their robot so.
+    ``<include file="robot.xml"/>`` inserts the contents of another file. Usually the file of a scene includes
+    the file of a robot.
 
     - MuJoCo 4.0 and Drake 1.51 read the other file.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) leave the element out. The
-      robot lacks its bodies, or there is none. PyBullet prints "unknown field 'include'".
+    - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) ignore the element, so the
+      robot lacks the bodies of the other file. PyBullet prints "unknown field 'include'".
 
-    What to do: load the file of the robot itself, or write one file: ``mj_saveLastXML`` does so, and ``dynx
-    convert --to mjcf``. ``dynx doctor --fix`` does not change it.
+    What to do: load the file of the robot itself, or write one file without ``<include>``. MuJoCo's
+    ``mj_saveLastXML`` and ``dynx convert --to mjcf`` write such a file. ``dynx doctor --fix`` does not change
+    the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -608,13 +612,13 @@ class ModelWithoutName(EditingRule):
 class WorldWithoutBody(Rule):
     """DX615 world-without-body: The world has no body, for which Pinocchio refuses the file.
 
-    A file of a floor, a table or of settings has geoms in ``<worldbody>``, or nothing.
+    If a file describes only a floor, a table or settings, its ``<worldbody>`` has only geoms, or is empty.
 
-    - MuJoCo 4.0 and Drake 1.51 read a world in which nothing moves; so does PyBullet 3.2.7 where there is a
-      geom.
+    - MuJoCo 4.0 and Drake 1.51 read a world in which nothing moves. PyBullet 3.2.7 also reads it if there is
+      a geom.
     - Pinocchio 4.1 (``buildModelFromMJCF``) raises "No such node (body)" or "no body found in parsed tree".
 
-    What to do: nothing, if nothing should move. Load the file with the robot, which includes this one.
+    What to do: if the file of a robot includes this file, load the file of the robot. Otherwise do nothing.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -635,9 +639,9 @@ class MeshOfMjcfNotObj(Rule):
 
     MuJoCo reads meshes in STL, OBJ and its own format MSH.
 
-    - MuJoCo 4.0 reads the mesh; Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) load
-      the robot without it.
-    - Drake 1.51 refuses the file, also where no geom uses the mesh: "Drake's MuJoCo parser currently only
+    - MuJoCo 4.0 reads the mesh. Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) load
+      the robot without the mesh.
+    - Drake 1.51 refuses the file, even if no geom uses the mesh: "Drake's MuJoCo parser currently only
       supports mesh files in .obj format".
 
     What to do: convert the meshes to OBJ, or the robot to URDF (``dynx convert --to urdf``). ``dynx doctor
@@ -661,13 +665,15 @@ class MeshOfMjcfNotObj(Rule):
 class MeshOfMjcfNotFound(Rule):
     """DX617 mesh-of-mjcf-not-found: The file of a mesh is not where the model says.
 
-    ``<mesh file="arm.obj"/>`` is looked for in ``meshdir`` of the compiler, from the folder of the file.
+    The path in ``<mesh file="arm.obj"/>`` is relative to ``meshdir`` of the compiler, which is relative to
+    the folder of the file.
 
-    - MuJoCo 4.0 refuses the model, also where no geom uses the mesh: "Error opening file". Drake 1.51 refuses
-      it too: "The mesh asset could not be found".
-    - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) load the robot without it.
+    - MuJoCo 4.0 refuses the file, even if no geom uses the mesh: "Error opening file". Drake 1.51 also
+      refuses it: "The mesh asset could not be found".
+    - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) load the robot without the
+      mesh.
 
-    dynx needs the mesh where a mass follows from it.
+    dynx needs the mesh only if the mass of a body follows from it.
 
     What to do: put the file there, or correct the path, capitals included.
     """
@@ -692,16 +698,16 @@ class PlaceOfFixedBody(Rule):
     A body of ``<worldbody>`` without a joint is fixed to the world at its ``pos``. Most arms have such a
     base.
 
-    - MuJoCo 4.0 and Drake 1.51 read its place and its mass.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) puts the first body of the world at the origin, and with it the
-      robot. The frame of the body has no mass.
+    - MuJoCo 4.0 and Drake 1.51 read the pose and the mass of this body.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) puts this body, and with it the robot, at the origin. The frame
+      of the body has no mass.
     - PyBullet 3.2.7 lets the robot float (DX619).
 
-    The robot stands elsewhere: all poses are off by the place of the body. Jacobians and the equations of
-    motion differ only where the body is turned.
+    The effect: all poses are off by the pose of this body. If the body is rotated, Jacobians and the
+    equations of motion differ, too.
 
-    What to do: place the model in the world by your own transformation, or convert the file to URDF (``dynx
-    convert --to urdf``). ``dynx doctor --fix`` does not change it.
+    What to do: transform the poses in your program, or convert the file to URDF (``dynx convert --to urdf``).
+    ``dynx doctor --fix`` does not change the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -723,13 +729,14 @@ class FixedBodyFloats(Rule):
     A body of ``<worldbody>`` without a joint is fixed to the world. Most arms have such a base.
 
     - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 fix it to the world.
-    - PyBullet 3.2.7 (``loadMJCF``) makes it the base of a robot, which floats if the base has a mass.
+    - PyBullet 3.2.7 (``loadMJCF``) makes it the base of the robot. If the base has a mass, the robot floats.
       ``loadMJCF`` has no option ``useFixedBase``.
 
-    The robot falls, and its mass matrix has six more rows.
+    The effect: the robot falls, and its mass matrix has six more rows.
 
-    What to do: tie the base to the world by ``p.createConstraint``, or convert the file to URDF and load it
-    with ``useFixedBase=True`` (``dynx convert --to urdf``). ``dynx doctor --fix`` does not change it.
+    What to do: fix the base to the world by ``p.createConstraint``. Or convert the file to URDF (``dynx
+    convert --to urdf``), and load it with ``useFixedBase=True``. ``dynx doctor --fix`` does not change the
+    file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)

@@ -26,25 +26,24 @@ class LinkNamedWorld(Rule):
     """DX109 link-named-world: A link that is not the ground is named world, which engines mistake for the
     ground.
 
-    URDF gives the name ``world`` no meaning, but engines do. It is harmless as the root of a robot with a
-    fixed base. Elsewhere:
+    URDF gives the name ``world`` no meaning, but engines do. The name is harmless for the root link of a
+    robot with a fixed base. In other cases:
 
-    - As the root with a floating base: Drake 1.51.1 mistakes the link for the world itself and fixes the
-      robot to it. PyBullet 3.2.7 gives the link no mass if it has no ``<inertial>``, and then fixes it to the
-      world (any other name would weigh 1 kg). MuJoCo 4.0.0 mistakes it for its world body, which cannot have
-      a free joint.
-    - On a link that is not the root, Drake refuses the file ("form one or more loops"). MuJoCo drops the mass
-      and the tensor of that link without a warning.
+    - The root link with a floating base: Drake 1.51.1 mistakes the link for the world, and fixes the robot to
+      it. If the link has no ``<inertial>``, PyBullet 3.2.7 gives it no mass (a link of another name gets 1
+      kg), and fixes it to the world. MuJoCo 4.0.0 mistakes the link for its world body, which cannot have a
+      free joint.
+    - A link that is not the root: Drake refuses the file ("form one or more loops"). MuJoCo drops the mass
+      and the tensor of the link without a warning.
     - Pinocchio 4.1.0 gives the name no meaning.
 
-    The effect: a robot that cannot move its base, or (MuJoCo) a mass matrix without that link.
+    The effect: the base of the robot cannot move, or (MuJoCo) the mass matrix lacks this link.
 
-    What to do: keep the name ``world`` for the root of a robot that is fixed, and give other links other
-    names. If the link stands for the ground, load the robot with a fixed base.
+    What to do: use the name ``world`` only for the root link of a robot with a fixed base. If the link stands
+    for the ground, load the robot with a fixed base.
 
-    ``dynx doctor --fix`` renames the link to ``world_link``, in the joints that name it and in
-    ``<gazebo reference>`` too. Programs may look the link up by its old name: ``--choose DX109=keep`` keeps
-    it.
+    ``dynx doctor --fix`` renames the link to ``world_link``, also in the joints that name it and in ``<gazebo
+    reference>``. If a program looks the link up by its old name, ``--choose DX109=keep`` keeps the name.
     """
 
     engines = measured_on("drake", "mujoco")
@@ -80,10 +79,10 @@ _UNIVERSE = "universe"
 class JointNamedUniverse(EditingRule):
     """DX213 joint-named-universe: A fixed joint is named universe, which is Pinocchio's name for the world.
 
-    Pinocchio 4.1 keeps a list of frames that begins with an entry ``universe``, which is the world. A fixed
-    joint becomes a frame of its name, and is looked up by that name when its child link is attached, which
-    finds the world. The file loads without a warning, and the robot lacks the mass beyond the joint. The mass
-    matrix was off by 40 % for a tool at the end of an arm.
+    The list of frames of Pinocchio 4.1 begins with a frame ``universe``, which is the world. A fixed joint
+    becomes a frame with the name of the joint. To attach the child link, Pinocchio looks up this name, and
+    finds the world. The file loads without a warning, and the robot lacks the mass beyond the joint. For a
+    tool at the end of an arm, the mass matrix was off by 40 %.
 
     A moving joint of that name does not change the model, but ``model.getJointId("universe")`` is the world
     and not that joint.
@@ -91,9 +90,9 @@ class JointNamedUniverse(EditingRule):
     PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file as intended. A link named ``universe`` is harmless
     in all four.
 
-    What to do: give the joint another name. ``dynx doctor --fix`` calls it ``universe_joint``, in mimic
-    joints, transmissions and Gazebo references too. Programs that look the joint up by its name must be
-    changed with it.
+    What to do: give the joint another name. ``dynx doctor --fix`` renames it to ``universe_joint``, also in
+    mimic joints, transmissions and Gazebo references. If a program looks the joint up by its name, change the
+    program, too.
     """
 
     advice = "Give the joint another name."
@@ -117,20 +116,19 @@ class JointNamedRootJoint(EditingRule):
     """DX217 joint-named-root-joint: A joint that moves is named root_joint, which is Pinocchio's name for the
     joint of a floating base.
 
-    ``pinocchio.buildModelFromUrdf(path, pinocchio.JointModelFreeFlyer())`` makes a robot float. The free
-    joint is called ``root_joint``, and its frame is the first in the list.
+    ``pinocchio.buildModelFromUrdf(path, pinocchio.JointModelFreeFlyer())`` loads a robot with a floating
+    base. Pinocchio names the joint of the floating base ``root_joint``.
 
-    - Pinocchio 4.1 looks the frame of a moving joint up by its name when it attaches the child link. For a
-      joint named ``root_joint`` it finds the frame of the floating base: the link is fixed to the base, and
-      the joint moves nothing. The file loads without a warning. The mass matrix of an arm was off by 50 to 90
-      %. On the fixed base, and for a fixed joint or a link of that name, nothing happens.
+    - Pinocchio 4.1 attaches the child link of a moving joint to the frame with the joint's name. For a joint
+      named ``root_joint`` it finds the frame of the floating base: the link is fixed to the base, and the
+      joint moves nothing. The file loads without a warning. The mass matrix of an arm was off by 50 to 90 %.
+      With a fixed base, and for a fixed joint or a link of this name, there is no error.
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file as intended.
 
-    What to do: give the joint another name. ``dynx doctor --fix`` calls it ``root_joint_1``, in mimic joints,
-    transmissions and Gazebo references too. Programs that look the joint up by its name must be changed with
-    it. Where the name must be kept, programs can give the free joint another name by the third argument:
-    ``buildModelFromUrdf(path, JointModelFreeFlyer(), "free_flyer")``. The file is corrected all the same,
-    because users who load it in the usual way get no warning.
+    What to do: give the joint another name. ``dynx doctor --fix`` renames it to ``root_joint_1``, also in
+    mimic joints, transmissions and Gazebo references. If a program looks the joint up by its name, change the
+    program, too. If you must keep the name, give the joint of the floating base another name in the call:
+    ``buildModelFromUrdf(path, JointModelFreeFlyer(), "free_flyer")``.
     """
 
     advice = "Give the joint another name."
@@ -151,12 +149,12 @@ class JointNamedRootJoint(EditingRule):
 class RobotWithoutName(EditingRule):
     """DX412 robot-without-name: The robot has no name.
 
-    URDF requires ``<robot name="...">``. Nothing in the dynamics depends on it, but it decides whether the
-    file loads.
+    URDF requires ``<robot name="...">``.
 
-    - Pinocchio 4.1 and PyBullet 3.2.7 refuse a robot without the attribute. Both accept an empty name.
-    - Drake 1.51 refuses both.
-    - MuJoCo 4.0 reads both. So does dynx, which then names the robot after its file.
+    - Pinocchio 4.1 and PyBullet 3.2.7 refuse a robot without the attribute ``name``. They accept an empty
+      name.
+    - Drake 1.51 refuses a missing name and an empty name.
+    - MuJoCo 4.0 and dynx accept both. dynx then names the robot after its file.
 
     What to do: give the robot a name. ``dynx doctor --fix`` writes the name of the file, or ``robot`` for a
     text without a file.
@@ -183,16 +181,16 @@ class RobotWithoutName(EditingRule):
 class PercentInName(EditingRule):
     """DX414 percent-in-name: A name has a % in it, which PyBullet uses as a printf format.
 
-    PyBullet 3.2.7 puts names into the messages it prints, and uses some of them as the format of ``printf``.
-    ``%p`` prints memory contents. ``%s`` reads memory and ``%n`` writes memory, which can end the process.
-    Whether that happens depends on which message is printed (one about a link without ``<inertial>``, say),
-    so a file can load for years and crash one day. dynx does not give such a file to PyBullet.
+    PyBullet 3.2.7 prints messages with names, and uses some of these messages as the format of ``printf``.
+    ``%p`` then prints memory contents. ``%s`` reads memory and ``%n`` writes memory, which can end the
+    process. This happens only if PyBullet prints such a message, for example about a link without
+    ``<inertial>``. So a file can load for years and then crash. dynx does not give such a file to PyBullet.
 
     Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 are not affected.
 
-    What to do: use letters, digits and ``_`` in names. ``dynx doctor --fix`` writes ``_`` for ``%`` in the
-    name and wherever the document mentions it (ends of joints, mimic joints, Gazebo references). Change
-    programs that look up links or joints by the old name.
+    What to do: use letters, digits and ``_`` in names. ``dynx doctor --fix`` replaces ``%`` by ``_`` in the
+    name, and wherever the file uses the name (parents and children of joints, mimic joints, Gazebo
+    references). If a program looks a link or joint up by the old name, change the program, too.
     """
 
     stage = "reading"
@@ -227,16 +225,16 @@ def _percent_message(kind: str, name: str) -> str:
 class NameWithBlanks(EditingRule):
     """DX533 name-with-blanks: A name is blank, or begins or ends with a blank.
 
-    ``<link name=" "/>`` or ``<joint name="elbow ">``: nobody sees the blank, and it is part of the name. A
-    program that looks up ``elbow`` does not find the joint. A joint whose parent is ``base`` does not find
-    the link ``base ``. Every engine refuses that file, and so does dynx, which names the similar link.
+    Examples are ``<link name=" "/>`` and ``<joint name="elbow ">``. The blank is part of the name, but nobody
+    sees it. A program that looks up ``elbow`` does not find the joint.
 
-    Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file and keep the blanks, and so does
-    dynx.
+    Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0, Drake 1.51 and dynx load such a file and keep the blanks. They
+    refuse the file if a joint has the parent ``base`` and the link is named ``base ``. dynx then names the
+    similar link.
 
-    What to do: write the name without them. ``dynx doctor --fix`` does so with ``--choose DX533=trim``,
-    wherever the document names the link or joint. A name of blanks alone becomes ``link`` or ``joint``, with
-    a number where that is taken. By default it leaves the names, which programs may use.
+    What to do: write the name without these blanks. By default ``dynx doctor --fix`` leaves the names,
+    because programs may use them. With ``--choose DX533=trim`` it removes the blanks wherever the file uses
+    the name. A name of blanks alone becomes ``link`` or ``joint``, with a number if this name exists already.
     """
 
     kind = "practice"

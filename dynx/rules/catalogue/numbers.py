@@ -21,27 +21,24 @@ from dynx.rules.numbers_in_text import (
 class DecimalComma(MisspelledNumberRule):
     """DX401 decimal-comma: A number is written with a comma instead of a decimal point.
 
-    URDF writes decimals with a point in every language, as XML Schema does. Programs that print numbers by
-    the current locale (a CAD exporter on a German or French computer) write a comma.
+    In URDF the decimal separator is a point. A program that prints numbers in the current locale, such as a
+    CAD exporter on a German or French computer, writes a comma.
 
-    Each engine reads it differently:
+    - Pinocchio 4.1: with such a number in the ``<mass>`` or ``<origin>`` of an ``<inertial>`` it drops the
+      whole inertial, so the link has no mass. With such a number in the ``<inertia>`` it drops only the
+      tensor, so the link is a point mass. It prints a line on stderr. In a ``<joint>``, it refuses the file.
+    - PyBullet 3.2.7 reads each number up to the comma: ``2,5`` is 2, and ``0,03`` is 0. It prints no warning.
+    - MuJoCo 4.0 refuses the file, and names the line.
+    - Drake 1.51 reads a single number up to the comma, and refuses a vector.
 
-    - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` it drops the whole inertial,
-      so the link weighs nothing. With such an ``<inertia>`` it drops only the tensor, so the link is a point
-      mass. A line on stderr says so. In a ``<joint>`` the file is refused.
-    - PyBullet 3.2.7 reads up to the comma: ``2,5`` is 2, ``0,03`` is 0. It prints no warning. In a vector it
-      does so with each of the three numbers.
-    - MuJoCo 4.0 refuses the file and names the line.
-    - Drake 1.51 reads up to the comma in a single number, as PyBullet does, and refuses a vector.
+    The effect: the digits after the comma are lost. For example, a mass of 2.5 kg becomes 2 kg, and an
+    inertia of 0.03 becomes 0.
 
-    The effect is as large as the digits behind the comma: a mass of 2 instead of 2.5 kg, an inertia of 0
-    instead of 0.03.
+    What to do: write a point. ``dynx doctor --fix`` writes a point in every number of links and joints.
 
-    What to do: write a point. ``dynx doctor --fix`` does so in every number of links and joints.
-
-    There is one other reading: ``1,250`` may be one thousand two hundred and fifty, written with a comma
-    between thousands. dynx reads the comma as a decimal point unless the user chooses
-    ``--choose DX401=thousands``. A number with commas and a point, ``1,250.5``, is unambiguous.
+    ``1,250`` may also mean one thousand two hundred and fifty. dynx reads the comma as a decimal separator,
+    unless you write ``--choose DX401=thousands``. A number with commas and a point, such as ``1,250.5``, is
+    unambiguous.
     """
 
     advice = "Write decimals with a point."
@@ -66,18 +63,18 @@ class CommaBetweenNumbers(MisspelledNumberRule):
 
     URDF separates the numbers of a vector by blanks. Other formats use commas or semicolons.
 
-    - Pinocchio 4.1 refuses the file where the vector is in a ``<joint>``. In an ``<inertial>`` it drops the
-      whole inertial with a line on stderr, so the link weighs nothing.
-    - PyBullet 3.2.7 reads ``1, 2, 3`` as intended, because it reads the number at the beginning of each word.
-      Without blanks, ``1,2,3``, it finds one word instead of three, prints a warning and uses zeros: a joint
-      sits at its parent's origin.
+    - Pinocchio 4.1 refuses the file if the vector is in a ``<joint>``. In an ``<inertial>`` it drops the
+      whole inertial with a line on stderr, so the link has no mass.
+    - PyBullet 3.2.7 reads ``1, 2, 3`` correctly, because it reads the number at the beginning of each word.
+      In ``1,2,3`` it finds one word instead of three, prints a warning and uses zeros. A joint is then at the
+      origin of its parent.
     - MuJoCo 4.0 and Drake 1.51 refuse the file.
 
-    The effect is that of a missing offset or rotation: of order 1 in the positions of all links behind it. Of
-    the files that come with PyBullet, ``bicycle/bike.urdf`` has such a vector.
+    The effect is a missing offset or rotation: the positions of all links beyond it have a relative error of
+    order 1. An example is ``bicycle/bike.urdf``, which comes with PyBullet.
 
-    What to do: separate numbers by blanks. ``dynx doctor --fix`` does so. In ``0,2 0,5 0,1`` the commas are
-    decimal points, see DX401.
+    What to do: separate numbers by blanks. ``dynx doctor --fix`` writes blanks. In ``0,2 0,5 0,1`` the commas
+    are decimal separators, see DX401.
     """
 
     advice = "Separate the numbers of a vector by blanks alone."
@@ -91,24 +88,25 @@ class CommaBetweenNumbers(MisspelledNumberRule):
 class TextAfterNumber(MisspelledNumberRule):
     """DX403 text-after-number: A number is followed by text that does not belong to it.
 
-    A second point, a unit, a Fortran exponent (``1.5d-3``), a hexadecimal number.
+    Examples of such text are a second point, a unit, a Fortran exponent (``1.5d-3``), or the ``x`` of a
+    hexadecimal number.
 
-    - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` it drops the whole inertial,
-      so the link weighs nothing. With such an ``<inertia>`` it drops only the tensor, so the link is a point
-      mass. A line on stderr says so. In a ``<joint>`` the file is refused.
-    - PyBullet 3.2.7 reads the number at the beginning and ignores the rest, without a warning. ``1.5d-3`` is
-      then 1.5, a thousand times too large.
+    - Pinocchio 4.1: with such a number in the ``<mass>`` or ``<origin>`` of an ``<inertial>`` it drops the
+      whole inertial, so the link has no mass. With such a number in the ``<inertia>`` it drops only the
+      tensor, so the link is a point mass. It prints a line on stderr. In a ``<joint>``, it refuses the file.
+    - PyBullet 3.2.7 reads the number at the beginning and ignores the rest, without a warning. It reads
+      ``1.5d-3`` as 1.5, a thousand times too large.
     - MuJoCo 4.0 refuses the file and names the line, but reads hexadecimal numbers.
-    - Drake 1.51 reads single numbers as PyBullet does and refuses vectors. It reads a hexadecimal number as
+    - Drake 1.51 reads single numbers as PyBullet does, and refuses vectors. It reads a hexadecimal number as
       0.
 
-    The effect ranges from none (a limit that is not used) to a link without mass. Of the files that come with
-    PyBullet, ``biped/biped2d_pybullet.urdf`` has ``-1.57.``.
+    The effect ranges from none (for example in an effort limit) to a link without mass. An example is
+    ``biped/biped2d_pybullet.urdf``, which comes with PyBullet and has the number ``-1.57.``.
 
-    What to do: write the number alone, in SI units. ``dynx doctor --fix`` keeps the number where a point or
-    the name of its SI unit follows (``1.57.``, ``2.5 kg``). A Fortran exponent is rewritten with ``e``, a
-    hexadecimal number in decimals. Text that would make another number of it (``25mm``, ``90deg``, ``1/5``)
-    and words with no number at the beginning (``heavy``) are DX420.
+    What to do: write only the number, in SI units. ``dynx doctor --fix`` removes a point or the name of the
+    SI unit after a number (``1.57.``, ``2.5 kg``). It writes a Fortran exponent with ``e``, and a hexadecimal
+    number as a decimal number. If the text changes the meaning of the number (``25mm``, ``90deg``, ``1/5``),
+    or there is no number at the beginning (``heavy``), see DX420.
     """
 
     advice = "Write the number alone, in SI units."
@@ -125,21 +123,22 @@ class TextAfterNumber(MisspelledNumberRule):
 class VectorOfWrongLength(MisspelledNumberRule):
     """DX404 vector-of-wrong-length: A vector has more or fewer than three numbers.
 
-    ``rpy="-3.14159 1.57079 0 0"`` has one too many, ``xyz="0.2 0.1"`` one too few.
+    For example, ``rpy="-3.14159 1.57079 0 0"`` has one number too many, and ``xyz="0.2 0.1"`` has one too
+    few.
 
-    - Pinocchio 4.1 refuses the file where the vector is in a ``<joint>``. In an ``<inertial>`` it drops the
-      whole inertial with a line on stderr, so the link weighs nothing.
-    - PyBullet 3.2.7 uses the first three of four numbers without a warning. With two it prints a warning and
-      uses zeros for all three. In an ``<axis>`` it refuses the file.
+    - Pinocchio 4.1 refuses the file if the vector is in a ``<joint>``. In an ``<inertial>`` it drops the
+      whole inertial with a line on stderr, so the link has no mass.
+    - PyBullet 3.2.7 uses the first three of four numbers without a warning. If there are only two, it prints
+      a warning and uses zeros for all three. In an ``<axis>`` it refuses two numbers.
     - MuJoCo 4.0 and Drake 1.51 refuse the file.
 
-    The effect of a vector that became zero is of order 1 in the positions of all links behind it. Of the
-    files that come with PyBullet, ``quadruped/microtaur/microtaur.urdf`` has vectors of four numbers.
+    The effect: if a vector becomes zero, the positions of all links beyond it have a relative error of order
+    1. An example is ``quadruped/microtaur/microtaur.urdf``, which comes with PyBullet and has vectors of four
+    numbers.
 
-    What to do: find out which three numbers were intended. ``dynx doctor --fix`` keeps the first three, as
-    PyBullet does, and adds zeros where numbers are missing, as a person would read the file. With
-    ``--choose DX404=default`` it removes the attribute instead, so that the default applies: zero for an
-    origin, (1, 0, 0) for an axis.
+    What to do: find out which three numbers were intended. ``dynx doctor --fix`` keeps the first three
+    numbers, and adds zeros for missing numbers. With ``--choose DX404=default`` it removes the attribute
+    instead, so that the default applies: zero for an origin, (1, 0, 0) for an axis.
     """
 
     advice = "Write three numbers."
@@ -168,22 +167,22 @@ _SHAPES_READ_ALIKE = ("box", "sphere", "cylinder", "capsule", "mesh")
 class BlankAfterNumber(MisspelledNumberRule):
     """DX405 blank-after-number: White space follows a number, or a no-break space precedes it.
 
-    Pinocchio 4.1 (its reader is urdfdom) skips white space in front of a number and accepts none behind it:
+    Pinocchio 4.1 (its reader is urdfdom) accepts white space before a number, but not after it:
 
-    - in a ``<mass>`` it prints on stderr that the mass "is not a float" and drops the whole inertial, so the
-      link weighs nothing;
-    - in an ``<inertia>`` it drops the tensor alone, also with a line on stderr, so the link is a point mass;
-    - in a ``<limit>``, ``<dynamics>`` or ``<mimic>`` of a joint it refuses the file.
+    - In a ``<mass>`` it prints on stderr that the mass "is not a float", and drops the whole inertial, so the
+      link has no mass.
+    - In an ``<inertia>`` it drops only the tensor, also with a line on stderr, so the link is a point mass.
+    - In a ``<limit>``, ``<dynamics>`` or ``<mimic>`` of a joint it refuses the file.
 
-    PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the number, and so does dynx. In front of a number all
-    engines read blanks, tabs and line breaks. No engine treats a no-break space (U+00A0) as a blank: MuJoCo
-    refuses it behind a number. In front of a number PyBullet reads 0, and MuJoCo and Drake refuse the file.
-    Blanks between and around the three numbers of a vector are accepted everywhere (tabs are not, see DX406).
+    PyBullet 3.2.7, MuJoCo 4.0, Drake 1.51 and dynx read the number. All engines accept blanks, tabs and line
+    breaks before a number. No engine treats a no-break space (U+00A0) as a blank. After a number, MuJoCo
+    refuses it. Before a number, PyBullet reads 0, and MuJoCo and Drake refuse the file. All engines accept
+    blanks between and around the three numbers of a vector (but not tabs, see DX406).
 
-    The effect is a link without mass, or without a moment of inertia: the mass matrix is off by as much as
-    the link matters, of order 0.01 to 1.
+    The effect is a link without mass, or without a moment of inertia. The relative error of the mass matrix
+    is of order 0.01 to 1.
 
-    What to do: remove the blank. ``dynx doctor --fix`` does so and changes no digit.
+    What to do: remove the white space, as ``dynx doctor --fix`` does.
     """
 
     advice = "Remove the white space."
@@ -200,21 +199,20 @@ class BlankAfterNumber(MisspelledNumberRule):
 class TabInVector(MisspelledNumberRule):
     """DX406 tab-in-vector: The numbers of a vector are separated by a tab, a line break or another blank.
 
-    XML calls tabs and line breaks white space like blanks, and a vector over two lines looks correct. Copied
-    text can hold another kind of blank, such as the no-break space U+00A0.
+    In XML tabs and line breaks are white space, so a vector over two lines looks correct. Copied text can
+    contain other blanks, such as the no-break space U+00A0.
 
-    - Pinocchio 4.1 separates numbers at blanks alone. A tab in a vector of a ``<joint>`` makes it refuse the
-      file. In an ``<inertial>`` it drops the whole inertial with a line on stderr, so the link weighs
-      nothing.
-    - PyBullet 3.2.7 separates numbers at blanks alone too. It finds one word instead of three, prints a
-      warning and uses zeros. Where there are both blanks and line breaks it can find three words that are not
-      the three numbers. A tab in an ``<axis>`` makes it refuse the file.
-    - MuJoCo 4.0 and Drake 1.51 read tabs and line breaks as intended, and refuse the no-break space.
+    - Pinocchio 4.1 separates numbers only at blanks. It refuses a tab in a vector of a ``<joint>``. In an
+      ``<inertial>`` it drops the whole inertial with a line on stderr, so the link has no mass.
+    - PyBullet 3.2.7 also separates numbers only at blanks. If it finds one word instead of three, it prints a
+      warning and uses zeros. In a vector with blanks and line breaks it can find three words that are not the
+      three numbers. It refuses a tab in an ``<axis>``.
+    - MuJoCo 4.0 and Drake 1.51 accept tabs and line breaks, and refuse the no-break space.
 
-    The effect is that of a missing offset: of order 1 in the positions of all links behind it, 0.1 in the
-    mass matrix of a small arm.
+    The effect is a missing offset: the positions of all links beyond it have a relative error of order 1. The
+    error of the mass matrix of a small arm was 0.1.
 
-    What to do: separate numbers by blanks. ``dynx doctor --fix`` does so and changes no digit.
+    What to do: separate numbers by blanks, as ``dynx doctor --fix`` does.
     """
 
     advice = "Separate the numbers of a vector by blanks alone."
@@ -227,18 +225,15 @@ class TabInVector(MisspelledNumberRule):
 class InfiniteLimit(MisspelledNumberRule):
     """DX407 infinite-limit: A limit of a joint is infinite.
 
-    ``<limit lower="-inf" upper="inf" effort="inf" velocity="inf"/>`` is understandable, but URDF has no
-    notation for infinity, and engines differ in reading one.
+    An example is ``<limit lower="-inf" upper="inf" effort="inf" velocity="inf"/>``. URDF has no notation for
+    infinity, so engines differ.
 
-    - Pinocchio 4.1 and Drake 1.51 refuse the file.
-    - PyBullet 3.2.7 and MuJoCo 4.0 read an infinity. MuJoCo refuses ``1e999``.
+    - Pinocchio 4.1, Drake 1.51 and dynx refuse the file.
+    - PyBullet 3.2.7 and MuJoCo 4.0 read infinity. MuJoCo refuses ``1e999``.
 
-    dynx refuses it too, because half of the engines do.
-
-    What to do: omit the limit where that is allowed (``type="continuous"`` needs no lower and no upper), or
-    write a number that no joint reaches. ``dynx doctor --fix`` writes the largest double,
-    1.7976931348623157e+308, which all four engines read and which dynx reads as "no limit". Infinite masses,
-    inertias and positions have no such substitute, see DX420.
+    What to do: write ``type="continuous"`` without ``lower`` and ``upper``, or write a number that no joint
+    reaches. ``dynx doctor --fix`` writes the largest double, 1.7976931348623157e+308, which all four engines
+    read and which dynx reads as "no limit". For infinite masses, inertias and positions, see DX420.
     """
 
     advice = "Write a large finite number, or omit the limit."
@@ -253,15 +248,16 @@ class InfiniteLimit(MisspelledNumberRule):
 class EmptyVector(MisspelledNumberRule):
     """DX408 empty-vector: An origin has a position or angles without numbers.
 
-    The variable of a template was empty, or an exporter had no value. URDF's default for a missing attribute
-    is zero, and a person would read an empty vector so.
+    An example is ``<origin xyz=""/>``. Usually a variable of a template was empty, or an exporter had no
+    value. URDF's default for a missing attribute is zero.
 
-    - Pinocchio 4.1 refuses the file where the origin is that of a ``<joint>``. In an ``<inertial>`` it drops
-      the whole inertial with a line on stderr, so the link weighs nothing.
+    - Pinocchio 4.1 refuses the file if the origin is that of a ``<joint>``. In an ``<inertial>`` it drops the
+      whole inertial with a line on stderr, so the link has no mass.
     - Drake 1.51 refuses the file.
-    - PyBullet 3.2.7 prints a warning and uses zeros. MuJoCo 4.0 uses zeros. So does dynx.
+    - PyBullet 3.2.7 prints a warning and uses zeros. MuJoCo 4.0 and dynx use zeros.
 
-    The effect is a file that does not load, or a link without mass: of order 0.01 to 1 in the mass matrix.
+    The effect is a file that does not load, or a link without mass. The relative error of the mass matrix is
+    then of order 0.01 to 1.
 
     What to do: remove the attribute, or write ``0 0 0``. ``dynx doctor --fix`` removes it.
     """
@@ -284,24 +280,25 @@ _ELEMENTS_THAT_NEED_NUMBERS = ("mass", "inertia")
 class AttributeWithoutNumber(MisspelledNumberRule):
     """DX420 attribute-without-number: An attribute that should hold numbers is empty or holds other text.
 
-    An exporter writes ``<limit lower="" upper="" .../>`` for what the user did not fill in, ``nan`` for the
-    centre of a body without mass, or ``none``.
+    Some exporters write ``<limit lower="" upper="" .../>`` if the user entered no limits, and ``nan`` for the
+    centre of mass of a body without mass. Other examples are ``none`` and ``25mm``.
 
-    - Pinocchio 4.1 refuses the file where the attribute is in a ``<joint>``, fixed ones included. In an
+    - Pinocchio 4.1 refuses the file if the attribute is in a ``<joint>``, also in a fixed joint. In an
       ``<inertial>`` it drops the tensor or the whole inertial with a line on stderr.
     - Drake 1.51 refuses the file.
-    - PyBullet 3.2.7 reads 0 for any word, and ``nan`` and ``inf`` as they are: results are then NaN.
-    - MuJoCo 4.0 reads an empty attribute of a joint as missing, and ``nan`` in a joint as it is. It refuses
+    - PyBullet 3.2.7 reads any word as 0. It reads ``nan`` and ``inf`` as such numbers, and results are then
+      NaN.
+    - MuJoCo 4.0 reads an empty attribute of a joint as missing, and accepts ``nan`` in a joint. It refuses
       words, and an empty mass or moment.
 
-    dynx refuses it with its line, except in elements that it does not read (limits of a fixed joint). An
-    empty ``xyz`` or ``rpy`` is DX408, an infinite limit DX407. Expressions of xacro, ``${mass}``, are not
-    corrected: the file has to be expanded.
+    dynx refuses the attribute, and names the line, unless it does not need the element (such as the limits of
+    a fixed joint). An empty ``xyz`` or ``rpy`` is DX408, and an infinite limit is DX407. dynx does not
+    correct an expression of xacro, such as ``${mass}``: expand the file with ``xacro``.
 
     What to do: write the numbers. The file does not contain the missing numbers, so ``dynx doctor --fix``
     leaves the attributes as they are and lists each with its line. It removes only empty attributes that have
     a default or that no engine needs. ``--choose DX420=guess`` writes 0 for a mass, an entry of a tensor and
-    a word of a vector, and removes any other attribute, so that its default holds.
+    a word in a vector. It removes any other such attribute, so that the default applies.
     """
 
     advice = "Write the numbers, or remove the attribute."
@@ -341,18 +338,17 @@ class AttributeWithoutNumber(MisspelledNumberRule):
 class MinusNotAscii(MisspelledNumberRule):
     """DX421 minus-not-ascii: A number has a minus sign or a dash of typography instead of the hyphen-minus.
 
-    Text that was copied from a document or a web page has the minus sign U+2212 or a dash in front of
-    negative numbers. It looks like ``-``, and no engine knows it.
+    Text that was copied from a document or a web page may have the minus sign U+2212 or a dash before
+    negative numbers. It looks like ``-``, but no engine reads it.
 
-    - Pinocchio 4.1 refuses the file where the number is in a ``<joint>``. In an ``<inertial>`` it drops the
+    - Pinocchio 4.1 refuses the file if the number is in a ``<joint>``. In an ``<inertial>`` it drops the
       whole inertial, or the tensor, with a line on stderr.
     - PyBullet 3.2.7 reads 0, without a warning.
     - MuJoCo 4.0 and Drake 1.51 refuse the file.
 
-    The effect is that of a number that became 0: of order 1 for a position, and a range that ends at 0 for a
-    limit.
+    The effect in PyBullet: a position is 0, or the range of a joint ends at 0.
 
-    What to do: write the hyphen-minus of the keyboard. ``dynx doctor --fix`` does so, and changes no digit.
+    What to do: write the hyphen-minus of the keyboard, as ``dynx doctor --fix`` does.
     """
 
     advice = "Write the hyphen-minus of the keyboard."
@@ -372,23 +368,21 @@ Expression = tuple[NumericAttribute, Misspelling]
 class ExpressionNotExpanded(EditingRule):
     """DX429 expression-not-expanded: A number that dynx does not need is an expression of xacro.
 
-    ``<origin rpy="${3.14159/2} 0 0"/>`` of a ``<collision>``, or ``<safety_controller k_velocity="${k}"/>``,
-    is left in a file that was written as URDF and never passed through ``xacro``, or that was expanded by
-    hand.
+    Examples are ``<origin rpy="${3.14159/2} 0 0"/>`` in a ``<collision>``, and ``<safety_controller
+    k_velocity="${k}"/>``. Such a file was never expanded by ``xacro``, or it was expanded by hand.
 
-    - In a ``<collision>`` MuJoCo 4.0 refuses the file ("bad format in attribute 'rpy'").
-    - In ``<calibration>``, ``<safety_controller>``, the position limits of a continuous joint, and the
-      ``<limit>``, ``<dynamics>`` and ``<mimic>`` of a fixed joint, Pinocchio 4.1 refuses the file. So does
-      Drake 1.51 in these limits and this ``<mimic>``.
-    - PyBullet 3.2.7 reads 0, without a warning: the shape is elsewhere, or has no size.
+    - In a ``<collision>``, MuJoCo 4.0 refuses the expression ("bad format in attribute 'rpy'").
+    - Pinocchio 4.1 refuses the expression in ``<calibration>``, in ``<safety_controller>``, in the position
+      limits of a continuous joint, and in the ``<limit>``, ``<dynamics>`` and ``<mimic>`` of a fixed joint.
+      Drake 1.51 refuses it in these limits and in this ``<mimic>``.
+    - PyBullet 3.2.7 reads 0, without a warning: the shape is at another place, or has no size.
 
-    In a ``<visual>`` every engine loads the file. Elsewhere in a joint, and in an ``<inertial>``, dynx
-    refuses it, because the dynamics depends on the number.
+    In a ``<visual>`` every engine accepts the expression. In other elements of a joint, and in an
+    ``<inertial>``, dynx refuses it, because the dynamics depends on the number.
 
-    What to do: write the number, or name the file ``.xacro`` and load it through ``xacro``.
-    ``dynx doctor --fix`` writes the value of mere arithmetic (numbers, ``pi``, ``+ - * /``). The file may not
-    hold the value of any other expression: the ``<collision>``, the element of the joint, or the position
-    limit is removed.
+    What to do: write the number, or name the file ``.xacro``, so that dynx expands it with ``xacro``. ``dynx
+    doctor --fix`` calculates simple expressions (numbers, ``pi``, ``+ - * /``). For any other expression it
+    removes the ``<collision>``, the element of the joint, or the position limit.
     """
 
     stage = "reading"

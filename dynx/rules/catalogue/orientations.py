@@ -27,19 +27,19 @@ from dynx.rules.numbers_in_text import decimal, is_plain, origins_with_quaternio
 class OrientationAsQuaternion(EditingRule):
     """DX418 orientation-as-quaternion: The orientation of an origin is a quaternion, which few engines read.
 
-    URDF 1.1 introduced ``<origin xyz="..." quat_xyzw="0 0 0.7071 0.7071"/>`` in place of ``rpy``. A file must
-    ask for it with ``<robot version="1.1">`` or ``1.2``.
+    URDF 1.1 introduced ``<origin xyz="..." quat_xyzw="0 0 0.7071 0.7071"/>`` in place of ``rpy``. The
+    quaternion has a meaning only in a file with ``<robot version="1.1">`` or ``1.2``. In other files every
+    engine ignores it, see DX530.
 
-    - Pinocchio 4.1 reads the quaternion and scales it to length 1. So does dynx.
+    - Pinocchio 4.1 and dynx read the quaternion, and scale it to length 1.
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore the attribute without a warning: the origin has no
       rotation.
 
-    The rotation is missing. The effect is of order 1 in the positions of all links behind a joint, and in the
-    mass matrix if the quaternion is in an ``<inertial>``.
+    The effect: if the origin is that of a joint, the positions of all links beyond it have a relative error
+    of order 1. If it is that of an ``<inertial>``, the mass matrix has such an error.
 
-    What to do: write the orientation as ``rpy``, with all digits. ``dynx doctor --fix`` does so, from the
-    quaternion scaled to length 1. The orientation is the same to rounding. In a file that states no such
-    version every engine ignores the quaternion, see DX530.
+    What to do: write the orientation as ``rpy``, with all digits. ``dynx doctor --fix`` computes ``rpy`` from
+    the quaternion. The orientation is the same to rounding.
     """
 
     stage = "reading"
@@ -65,19 +65,19 @@ class OrientationAsQuaternion(EditingRule):
 class UnreadableQuaternion(EditingRule):
     """DX419 unreadable-quaternion: The quaternion of an origin is no rotation, or stands beside ``rpy``.
 
-    In URDF from version 1.1 on ``quat_xyzw`` takes four numbers separated by blanks, not all zero, and no
-    ``rpy`` beside them. Only Pinocchio reads it, see DX418. So it is also the only engine that objects.
+    From URDF 1.1, ``quat_xyzw`` holds four numbers separated by blanks, not all zero. An origin with
+    ``quat_xyzw`` must not have ``rpy``. Of the four engines, only Pinocchio reads the quaternion (DX418).
 
-    - Pinocchio 4.1 refuses the file where the origin is that of a ``<joint>``. In an ``<inertial>`` it drops
-      the whole inertial with a line on stderr, so the link weighs nothing. A quaternion of length 0 is no
-      rotation to it, without a warning.
-    - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 use ``rpy``, or no rotation where there is none.
+    - Pinocchio 4.1 refuses the file if the origin is that of a ``<joint>``. In an ``<inertial>`` it drops the
+      whole inertial with a line on stderr, so the link has no mass. It reads a quaternion of length 0 as no
+      rotation, without a warning.
+    - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 use ``rpy``. Without ``rpy`` the origin has no rotation.
 
-    dynx refuses such an origin with its line.
+    dynx refuses such an origin, and names the line.
 
-    What to do: write one orientation, as ``rpy``. Where there is an ``rpy``, ``dynx doctor --fix`` keeps it
-    and removes the quaternion. It writes four numbers that are separated by commas or tabs as ``rpy``, and
-    removes any other text, so that the origin has no rotation, as three engines read it.
+    What to do: write one orientation, as ``rpy``. If there is an ``rpy``, ``dynx doctor --fix`` keeps it and
+    removes the quaternion. If there are four numbers separated by commas or tabs, it writes them as ``rpy``.
+    Otherwise it removes the quaternion, so that the origin has no rotation, as three engines read it.
     """
 
     stage = "reading"
@@ -112,16 +112,17 @@ _UNLIMITED_ENDS = (-100.0, 100.0)
 class AngleInDegrees(Rule):
     """DX513 angle-in-degrees: An angle seems to be written in degrees, where URDF reads radians.
 
-    Two patterns are reported. An ``rpy`` angle beyond a full turn, 6.28 rad: no orientation is written so,
-    while 10, 45, 90 and 180 are usual in degrees. The rule also reports limits of a revolute joint that are
-    both whole multiples of 5 between -360 and 360, at least one of them 30 or more. 30 rad are five turns,
-    and 30 degrees is a usual range. Limits of -100 and 100 are not reported, because they often stand for
-    "unlimited".
+    The rule reports two patterns. First, an ``rpy`` angle is above a full turn, 6.28 rad. Nobody writes such
+    an orientation in radians, but 10, 45, 90 and 180 are usual in degrees. Second, both limits of a revolute
+    joint are multiples of 5 between -360 and 360, and at least one of them is 30 or more. 30 rad are five
+    turns, and 30 degrees is a usual limit. The rule does not report limits of -100 and 100, because they
+    often mean "unlimited".
 
-    All engines read radians: 90 is 14.3 turns. They agree, but on a robot with wrong poses or joints without
-    effective stops.
+    All engines read radians: 90 is 14.3 turns. They agree, but the robot has wrong poses, or joints that do
+    not stop at their real limits.
 
-    That the unit is degrees is a guess, so no edit removes the cause. The message gives the value in radians.
+    The rule only guesses that the unit is degrees, so no edit removes the cause. The message gives the value
+    in radians.
     """
 
     kind = "practice"
@@ -176,17 +177,17 @@ def _radians(angle_deg: float) -> str:
 class AngleCutShort(EditingRule):
     """DX514 angle-cut-short: An angle is a multiple of pi/4 with only two or three decimals, such as 1.57.
 
-    ``1.57`` is 0.0008 rad short of pi/2 and ``3.14`` 0.0016 rad short of pi. At the end of a one metre arm
-    the error is 0.8 and 1.6 mm, more than the repeatability of the robot. Axes that are parallel in the CAD
-    model are not parallel in the file. So closed-form inverse kinematics (IKFast, the formulas for a
-    spherical wrist) finds no solution, or a wrong solution. Reported are angles in the ``<origin>`` of a
-    joint that are a multiple of pi/4, up to a full turn, rounded or cut to two or three decimals.
+    ``1.57`` is 0.0008 rad less than pi/2, and ``3.14`` is 0.0016 rad less than pi. At the end of an arm of 1
+    m the error is 0.8 mm or 1.6 mm, more than the repeatability of usual robots. Axes that are parallel in
+    the CAD model are then not parallel in the file. So closed-form inverse kinematics (IKFast, the formulas
+    for a spherical wrist) finds no solution, or a wrong solution. The rule reports angles in the ``<origin>``
+    of a joint that are a multiple of pi/4, up to a full turn, rounded or truncated to two or three decimals.
 
     All engines read the number unchanged.
 
-    What to do: write the angles in full, unless they were calibrated. ``dynx doctor --fix`` does so with
-    ``--choose DX514=full``, which moves the links beyond the joint by that error, and by default keeps the
-    angles.
+    What to do: write the angles with all digits, unless they were calibrated. By default ``dynx doctor
+    --fix`` keeps the angles. With ``--choose DX514=full`` it writes all digits, which moves the links beyond
+    the joint by this error.
     """
 
     kind = "practice"
@@ -233,14 +234,14 @@ class QuaternionWithoutVersion(EditingRule):
     """DX530 quaternion-without-version: An origin has a quaternion, but the robot states no version that
     reads it.
 
-    ``<origin quat_xyzw="..."/>`` is part of URDF from version 1.1 on. Without ``<robot version="1.1">`` (or
-    1.2) a file counts as version 1.0, and every engine ignores the quaternion without a warning: Pinocchio
-    4.1 too, which alone would read it. The engines agree, on a robot whose origin has no rotation, or that of
-    ``rpy``.
+    ``<origin quat_xyzw="..."/>`` is part of URDF 1.1 and 1.2. Without ``<robot version="1.1">`` (or 1.2) a
+    file has version 1.0, and every engine ignores the quaternion without a warning. The engines agree: the
+    origin has the rotation of ``rpy``, or none.
 
-    What to do: write the orientation as ``rpy``, which every engine reads. ``dynx doctor --fix`` does so with
-    ``--choose DX530=rpy``, which changes the robot to what the quaternion states. By default it leaves the
-    file as it is. Adding the version alone would help in Pinocchio only, see DX418.
+    What to do: write the orientation as ``rpy``, which every engine reads. By default ``dynx doctor --fix``
+    leaves the file as it is. With ``--choose DX530=rpy`` it writes the quaternion as ``rpy``, which changes
+    the robot. If you only add the version, Pinocchio reads the quaternion, but the other engines do not
+    (DX418).
     """
 
     kind = "practice"

@@ -31,26 +31,28 @@ class InertiaBeyondGeometry(Rule):
     """DX501 inertia-beyond-geometry: A moment of inertia is larger than any body of the link's shape and mass
     can have.
 
-    A body of mass m that reaches at most R from an axis has a moment of inertia about that axis of at most m
-    R^2. It has this moment only if all mass is at the distance R. Real parts have a third of it or less. The
-    rule uses the principal axes of the tensor through the centre of mass, and the reach of all shapes of the
-    link and of links rigidly connected to it. It reports moments that no distribution of the mass can have.
-    Shapes are enlarged, never reduced: a mesh counts as its convex hull.
+    The rule has two bounds.
 
-    A second bound holds along a line. Let the hull reach from -a to b along a direction, as seen from the
-    centre of mass. The mean square of the mass's distance in this direction is then at most a b (Bhatia and
-    Davis 2000). It follows from the tensor, as half the sum of the moments less the moment about that
-    direction. The rule examines thirteen directions of the link's axes and diagonals, and the three principal
-    directions. It widens the hull by a hundredth of its diagonal, and reports root mean squares a tenth
-    beyond the bound, because shapes are often drawn without the motor inside. This finds a plate whose tensor
-    is that of a block, and a centre of mass at the end of a link whose mass is spread over all of it.
+    First, if no point of a body of mass m is farther than R from an axis, the moment of inertia about this
+    axis is at most m R^2. It is m R^2 only if all mass is at the distance R. Real parts have a third of it or
+    less. The rule uses the principal axes of the tensor through the centre of mass. R is the reach of all
+    shapes of the link and of the links rigidly connected to it. A mesh counts as its convex hull, so R is
+    never too small.
 
-    Usual causes: the tensor is in kg mm^2 or g mm^2 where URDF requires kg m^2, or it was taken about the
-    link frame, not the centre of mass. Or the mesh is scaled by 0.001 and the tensor is not, or the tensor is
-    a placeholder.
+    Second, let the hull reach from -a to b along a direction, as seen from the centre of mass. The mean
+    square of the mass's distance in this direction is then at most a b (Bhatia and Davis 2000). The tensor
+    determines this mean square: it is half the sum of the three moments, minus the moment about the
+    direction, divided by the mass. The rule examines thirteen directions (the link's axes and diagonals), and
+    the three principal directions. Shapes are often drawn without the motor inside. So the rule widens the
+    hull by a hundredth of its diagonal, and reports a root mean square only if it is a tenth above the bound.
+    This bound finds, for example, a plate with the tensor of a block.
+
+    Usual causes: the tensor is in kg mm^2 or g mm^2 instead of kg m^2. Or it was computed about the origin of
+    the link frame instead of the centre of mass. Or the mesh is scaled by 0.001 and the tensor is not. Or the
+    tensor is a placeholder.
 
     All engines use the numbers unchanged, so they agree with each other, but not with the real robot: torques
-    are too large, and controllers tuned on them too stiff.
+    are too large, and controllers tuned with this model are too stiff.
 
     The file does not contain the true tensor, so no edit removes the cause.
     """
@@ -138,14 +140,14 @@ class InertiaBelowGeometry(Rule):
     """DX502 inertia-below-geometry: The inertia is that of a body a hundred times smaller than the link's
     shape.
 
-    A uniform body has a radius of gyration k = sqrt(I / m) of a fifth to a half of its size (a rod l/3.5, a
-    ball d/3.2). Where even the largest k is below a hundredth of the diagonal of the link's own shape, the
-    mass would have to be concentrated in a speck. Usual causes: the tensor is in kg m^2 times 1e-6 or 1e-9
-    (wrong units in the CAD program), or it was written with too few digits (``1e-06`` everywhere). Or it was
-    set to zero because an importer required the element.
+    The radius of gyration k = sqrt(I / m) of a uniform body is a fifth to a half of its size: for a rod of
+    length l it is l/3.5, for a ball of diameter d it is d/3.2. The rule reports a link if its largest k is
+    below a hundredth of the diagonal of its shape. Usual causes: the tensor has a wrong unit, which makes it
+    too small by 1e-6 or 1e-9. Or it was written with too few digits (``1e-06`` everywhere). Or it is zero
+    because an importer required the element.
 
-    All engines that load such a tensor use it. Torques come out too small, forward dynamics is badly
-    conditioned, and simulators with a fixed step may oscillate or diverge at such joints.
+    Engines that load such a tensor use it unchanged. Torques are too small, forward dynamics is badly
+    conditioned, and simulators with a fixed time step may oscillate or diverge at such joints.
 
     The file does not contain the true tensor, so no edit removes the cause.
     """
@@ -174,16 +176,17 @@ class CenterOfMassOutsideGeometry(Rule):
     """DX503 center-of-mass-outside-geometry: The centre of mass lies outside the bounding box of the link's
     shape.
 
-    Mass cannot be negative, so the centre of mass of a body lies within its convex hull, and so within its
-    bounding box. The rule uses the bounding box, along the axes of the link frame, of all shapes of the link
-    and of links rigidly connected to it. It widens the box by a hundredth of the diagonal, because shapes may
-    be slightly too small.
+    Mass cannot be negative, so the centre of mass of a body is inside its convex hull, and inside its
+    bounding box. The rule uses the bounding box of all shapes of the link and of the links rigidly connected
+    to it, along the axes of the link frame. It widens the box by a hundredth of the diagonal, because shapes
+    may be slightly too small.
 
-    Usual causes: the ``<origin>`` of ``<inertial>`` is in millimetres, or it is given in the frame of the CAD
-    assembly or of the parent, not of the link. Or it was mirrored for the other side and lost a sign. Or the
-    mesh was moved by the ``<origin>`` of ``<visual>`` and the inertial was not.
+    Usual causes: the ``<origin>`` of ``<inertial>`` is in millimetres. Or it is in the frame of the CAD
+    assembly or of the parent link instead of the link's frame. Or it was mirrored for the other side of the
+    robot with a wrong sign. Or the mesh was moved by the ``<origin>`` of ``<visual>``, and the inertial was
+    not.
 
-    All engines use the numbers unchanged: gravity torques are equally wrong in all of them.
+    All engines use the numbers unchanged: gravity torques are wrong by the same amount in all of them.
 
     The file does not contain the true centre of mass, so no edit removes the cause.
     """
@@ -214,16 +217,16 @@ class PlaceholderInertia(Rule):
     """DX504 placeholder-inertia: The inertia is a placeholder: the unit matrix, or one tensor for links of
     different mass.
 
-    Two patterns are reported. The tensor is exactly the unit matrix. 1 kg m^2 about every axis is the inertia
-    of a steel ball of 0.15 m radius and 111 kg, not of a usual link. And one tensor with three equal moments
-    (0.001 in many tutorials) that at least three links share although their masses differ: the inertias of
-    real links would differ too.
+    The rule reports two patterns. First, the tensor is exactly the unit matrix. 1 kg m^2 about every axis is
+    the inertia of a steel ball of 0.15 m radius and 111 kg, not of a usual link. Second, at least three links
+    have the same tensor with three equal moments (0.001 in many tutorials), although their masses differ.
 
-    All engines use the numbers unchanged. If a link of a few hundred grams has an identity tensor, the
-    placeholder dominates the inertia of the whole arm. Torques, and gains tuned with them, are then useless.
+    All engines use the numbers unchanged. If a link of a few hundred grams has the unit matrix as its tensor,
+    this placeholder dominates the inertia of the whole arm. Torques, and gains tuned with them, are then
+    useless.
 
-    The file does not contain the true tensor, so no edit removes the cause. Inertias from the shapes, with
-    mass spread evenly, are a better guess than any placeholder.
+    The file does not contain the true tensor, so no edit removes the cause. A better guess is the inertia of
+    the link's shapes with uniform density.
     """
 
     kind = "practice"
@@ -266,18 +269,18 @@ class MassRatioExtreme(Rule):
     """DX505 mass-ratio-extreme: Two bodies that a joint connects differ in mass by a factor of a million or
     more.
 
-    Links that fixed joints hold together count as one body. A body without mass is not reported here. A sum
-    in double precision carries 16 digits. Where a joint connects bodies a million apart, six of them are lost
-    to the difference of scale. The worst case is a light body that carries a heavy one.
+    Rigidly connected links count as one body. This rule does not report bodies without mass. If a joint
+    connects two bodies whose masses differ by a factor of a million, results lose six of the 16 digits of a
+    double. The worst case is a light body that carries a heavy one.
 
-    This affects simulators that solve joints as constraints between free bodies (ODE in Gazebo, contacts in
-    Bullet and MuJoCo). They converge slowly or not at all, while joints drift apart and oscillate. Forward
-    dynamics loses digits with every engine, since the condition number of the mass matrix is of the order of
-    the ratio. Inverse dynamics is not affected, and engines agree on it.
+    Simulators that solve joints as constraints between free bodies (ODE in Gazebo, contacts in Bullet and
+    MuJoCo) converge slowly or not at all, and joints drift apart and oscillate. Forward dynamics loses digits
+    in every engine, because the condition number of the mass matrix is about as large as the ratio of the
+    masses. Inverse dynamics is not affected, and engines agree on it.
 
-    Usual causes: a mass in grams or tonnes beside others in kilograms, or ``mass value="1e-06"`` for a sensor
-    frame because an importer refused links without mass. Only the author of the file knows which, so no edit
-    removes the cause.
+    Usual causes: a mass is in grams or tonnes, and others are in kilograms. Or a sensor frame has ``mass
+    value="1e-06"`` because an importer refused links without mass. Only the author of the file knows the
+    right mass, so no edit removes the cause.
     """
 
     kind = "practice"
@@ -310,18 +313,21 @@ class DensityImplausible(Rule):
     """DX517 density-implausible: A body is denser than any metal, or lighter than air, for the size of its
     shape.
 
-    The mass of rigidly connected links is divided by two volumes. The bounding box of their shapes is larger
-    than the body, so the true density is higher still: more than 25,000 kg/m^3 are reported (osmium, the
-    densest metal, has 22,600). Each side of the box counts as at least a hundredth of its diagonal, so that a
-    thin plate is not reported for its drawn thickness. The largest single shape, a mesh as its convex hull,
-    is no larger than the shapes together: less than 1 kg/m^3 in it are reported (air has 1.2).
+    Here a body is a group of rigidly connected links. The rule divides the mass of a body by two volumes.
 
-    Of 1,122 such bodies in example-robot-data the median is 500 kg/m^3, and 98 in 100 lie between 20 and
-    21,400. The least is 2.5 (a drone with an arm). Only the finger knuckles of one hand are beyond a bound:
-    50 g in cubes of 2 mm.
+    - The first volume is the bounding box of the body's shapes. The body is smaller than the box, so its true
+      density is higher than this quotient. The rule reports more than 25,000 kg/m^3 (osmium, the densest
+      metal, has 22,600). Each side of the box counts as at least a hundredth of its diagonal, because a thin
+      plate is often drawn too thin.
+    - The second volume is the largest single shape (of a mesh, its convex hull). The shapes together are at
+      least as large. The rule reports less than 1 kg/m^3 (air has 1.2).
 
-    Usual causes: a mass in grams or tonnes, or a shape in millimetres without ``scale="0.001 0.001 0.001"``.
-    Or a tiny placeholder stands for the shape, or an exporter computed the mass from a mesh in the wrong
+    Of the 1,122 such bodies in example-robot-data the median density is 500 kg/m^3. 98 % of them are between
+    20 and 21,400, and the least is 2.5 (a drone with an arm). The rule reports only the finger knuckles of
+    one hand, which have 50 g in cubes of 2 mm.
+
+    Usual causes: a mass is in grams or tonnes. Or a shape is in millimetres without ``scale="0.001 0.001
+    0.001"``. Or the shape is a tiny placeholder. Or an exporter computed the mass from a mesh in the wrong
     unit.
 
     All engines use the numbers unchanged. A heavy finger dominates every torque of the arm that carries it.
@@ -360,17 +366,17 @@ _MICROGRAM = 1e-9
 class MassNegligible(Rule):
     """DX518 mass-negligible: A link has a mass below a microgram, which no part of a robot has.
 
-    A screw has a gram, a grain of sand a milligram. Masses such as 1e-10 or 1e-15 kg are written because an
-    importer refused a link without mass, or they are residues of a computation whose result is zero. The
-    lightest link of example-robot-data that is not zero has 1e-9 kg, exactly a microgram.
+    A screw has a gram, and a grain of sand has a milligram. Masses such as 1e-10 or 1e-15 kg are placeholders
+    for an importer that refused a link without mass, or residues of a computation whose result is zero. In
+    example-robot-data the smallest mass that is not zero is 1e-9 kg, exactly a microgram.
 
-    Engines accept such a mass down to a bound of their own: MuJoCo 4.0.0 refuses a moving body below 1e-15
-    kg. A joint that carries nothing else accelerates by millions of rad/s^2 under the smallest torque, so a
-    simulation with any step diverges, and forward dynamics loses digits.
+    Engines accept small masses, but MuJoCo 4.0.0 refuses a moving body below 1e-15 kg. If a joint carries
+    only such a link, a very small torque causes an acceleration of millions of rad/s^2. So a simulation
+    diverges with any time step, and forward dynamics loses digits.
 
-    What to do: write zero, and attach frames by fixed joints; or enter the mass of the part. The file does
-    not say which was meant, so no edit removes the cause. The mass that ``dynx doctor --fix`` gives to moving
-    links without mass (DX110), 2e-15 kg, is not reported.
+    What to do: if the link is a frame, write zero and attach it by a fixed joint. Otherwise enter the mass of
+    the part. The file does not say which is right, so no edit removes the cause. The rule does not report
+    2e-15 kg, the mass that ``dynx doctor --fix`` gives to moving links without mass (DX110).
     """
 
     kind = "practice"
@@ -394,17 +400,18 @@ _LEAST_SHARE, _LEAST_ROBOT = 0.02, 1e-3
 class MassBeyondSize(Rule):
     """DX519 mass-beyond-size: A body without shapes is far too heavy for the distances between its joints.
 
-    If a body has no shapes, or if meshes are missing, the rule takes the distances from its frame to its
-    centres of mass and to the joints that it carries. If the distances of its neighbours are larger, it takes
-    those. The least size is a fiftieth of the sum of such distances in the whole robot. Reported are bodies
-    of more than 1e7 kg per cube of that length. In example-robot-data no body has more than 2e4 (an ankle of
-    0.6 kg between joints 3 cm apart): 500 times less.
+    A body without shapes has no size in the file. So the rule estimates a length: the largest distance from
+    the body's frame to its centres of mass and to the joints that it carries. If the length of a neighbour is
+    larger, the rule uses that one. The length is at least a fiftieth of the sum of such distances in the
+    whole robot. The rule reports a body of more than 1e7 kg per cube of this length. In example-robot-data no
+    body has more than 2e4 (an ankle of 0.6 kg between joints 3 cm apart), which is 500 times less. If all
+    meshes of a body are missing, it counts as a body without shapes. For bodies with shapes see DX517.
 
-    Usual causes: a mass in grams, an extra digit, or a tensor or a mass that an exporter computed from a mesh
-    in millimetres. In the last case, a finger of 56 g gets 56 tonnes.
+    Usual causes: a mass is in grams, or has an extra digit. Or an exporter computed the mass from a mesh in
+    millimetres: a finger of 56 g then gets 56 tonnes.
 
-    All engines use the numbers unchanged. Torques of all joints before such a body are those of that body
-    alone, and inverse dynamics of one engine may refuse it (DX119). Bodies with shapes are in DX517.
+    All engines use the numbers unchanged. Such a body dominates the torques of all joints before it, and
+    PyBullet's inverse dynamics may refuse it (DX119).
 
     The file does not contain the true mass, so no edit removes the cause.
     """

@@ -36,15 +36,14 @@ class InertiaFromShapesOfSdf(CallingRule):
 
     - Drake 1.51 reads both.
     - PyBullet 3.2.7 (``loadSDF``) reads the mass and the pose of the inertial. It computes the moments from
-      the bounding box of the collision shapes, and has no flag for those of the file. Without shapes they are
-      0.
+      the bounding box of the collision shapes; without shapes they are 0. No flag makes it read the moments
+      of the file.
 
-    The effect is the inertia of every link: tens of per cent of the mass matrix for most robots.
+    The effect: every link has another inertia. In most robots the mass matrix is off by tens of per cent.
 
-    What to do: set the moments of the file after loading, or convert the file to URDF
-    (``dynx convert --to urdf``) and load it with ``URDF_USE_INERTIA_FROM_FILE``. The file is correct, so
-    ``dynx doctor --fix`` does not change it. The doctor prints the call. Products of inertia remain an error,
-    as PyBullet has none.
+    What to do: set the moments after loading, or convert the file to URDF (``dynx convert --to urdf``) and
+    load it with ``URDF_USE_INERTIA_FROM_FILE``. The file is correct, so ``dynx doctor --fix`` does not change
+    it. The doctor prints the call that sets the moments. This call cannot set products of inertia (DX712).
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -89,11 +88,10 @@ class AxisWithoutLimit(EditingRule):
     ``<limit>`` of an ``<axis>`` is optional. Without it a joint is unlimited.
 
     - Drake 1.51 reads an unlimited joint.
-    - PyBullet 3.2.7 (``loadSDF``) refuses the whole file: "Cannot load SDF file". It does so for revolute and
-      prismatic joints, and not for continuous ones.
+    - PyBullet 3.2.7 (``loadSDF``) refuses the file ("Cannot load SDF file") if the joint is revolute or
+      prismatic. It accepts a continuous joint.
 
-    What to do: write a limit. 1e16 means no limit, by the convention of the format. ``dynx doctor --fix``
-    does so.
+    What to do: write a limit. In SDF the limit 1e16 means "no limit"; ``dynx doctor --fix`` writes it.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -116,14 +114,15 @@ class AxisWithoutLimit(EditingRule):
 class InertialWithoutInertia(EditingRule):
     """DX703 inertial-without-inertia: An inertial of SDF has no inertia, for which PyBullet refuses the file.
 
-    ``<inertial><mass>20</mass></inertial>`` has the moments that the format gives: 1 kg m^2 about each axis.
+    An example is ``<inertial><mass>20</mass></inertial>``. In SDF the default of the moments is 1 kg m^2
+    about each axis.
 
-    - Drake 1.51 reads these.
-    - PyBullet 3.2.7 (``loadSDF``) refuses the whole file: "Inertial element must have inertia element".
+    - Drake 1.51 uses this default.
+    - PyBullet 3.2.7 (``loadSDF``) refuses the file: "Inertial element must have inertia element".
 
-    The default is seldom what was meant: a link of 20 kg with moments of 1 kg m^2 is some 0.3 m large.
+    The default is rarely right: a link of 20 kg with moments of 1 kg m^2 has a size of about 0.3 m.
 
-    What to do: write the moments of the link. ``dynx doctor --fix`` writes those of the format.
+    What to do: write the moments of the link. ``dynx doctor --fix`` writes the default.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -149,20 +148,20 @@ class InertialWithoutInertia(EditingRule):
 class FramesOfSdf(Rule):
     """DX704 frames-of-sdf: A pose or an axis is stated in a frame that PyBullet does not read.
 
-    SDF states poses in other frames (``relative_to``, ``<frame>``), in degrees or as quaternions, and axes in
-    frames of their own (``expressed_in``, ``use_parent_model_frame``). A joint may stand off its child
-    (``<pose>``).
+    In SDF a pose may be relative to another frame (``relative_to``, ``<frame>``), in degrees, or a
+    quaternion. An axis may be in another frame (``expressed_in``, ``use_parent_model_frame``). A joint may
+    have an offset from its child (``<pose>``).
 
     - Drake 1.51 reads all of these.
-    - PyBullet 3.2.7 (``loadSDF``) reads six numbers of the pose of a link, in the frame of the model, and the
-      axis in the frame of the child. It drops the attributes, and the pose of a joint. A pose without numbers
-      ends the process.
+    - PyBullet 3.2.7 (``loadSDF``) reads the pose of a link as six numbers in the frame of the model, and the
+      axis in the frame of the child. It ignores the attributes, and the pose of a joint. If a pose has no
+      numbers, PyBullet ends the process.
 
-    The effect is another pose of the link, or another axis.
+    The effect: the link has another pose, or the joint has another axis.
 
-    What to do: convert the file to URDF for PyBullet (``dynx convert --to urdf``). ``dynx doctor --fix``
-    does not change it. So the effect in a report is what remains of the difference without all other
-    causes.
+    What to do: convert the file to URDF for PyBullet (``dynx convert --to urdf``). ``dynx doctor --fix`` does
+    not change the file. So the report gives as the effect the difference that remains after all other causes
+    are removed.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -197,12 +196,12 @@ class JointToWorld(Rule):
     ``<parent>world</parent>`` fixes a robot of SDF to the world.
 
     - Drake 1.51 welds the link to its world.
-    - PyBullet 3.2.7 (``loadSDF``) looks for a link of that name, and refuses the whole file: "Cannot find
-      parent link for a joint".
+    - PyBullet 3.2.7 (``loadSDF``) finds no link named ``world``, and refuses the file: "Cannot find parent
+      link for a joint".
 
     What to do: convert the file to URDF for PyBullet (``dynx convert --to urdf``), and load it with
-    ``useFixedBase=True``. ``dynx doctor --fix`` does not change it, since without the joint the robot is
-    free.
+    ``useFixedBase=True``. ``dynx doctor --fix`` does not change the file, because without this joint the
+    robot would float.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -224,16 +223,15 @@ class SpringOfSdf(Rule):
 
     ``<spring_stiffness>`` and ``<spring_reference>`` in ``<dynamics>`` of an axis are a spring.
 
-    - Drake 1.51 makes a force element of it, which inverse dynamics with force elements and forward dynamics
-      have.
-    - PyBullet 3.2.7 (``loadSDF``) drops it.
+    - Drake 1.51 adds a force element. Forward dynamics, and inverse dynamics with force elements, include it.
+    - PyBullet 3.2.7 (``loadSDF``) drops the spring.
 
     The effect is the stiffness times the distance from the reference.
 
     What to do: decide whether torques include springs. The file is correct, so ``dynx doctor --fix`` does not
-    change it. dynx reads springs, and its quantities have them with ``joint_dynamics=True``. The doctor
-    compares the rigid bodies alone. No call removes the force element, so the effect in a report is what
-    remains of the difference without all other causes.
+    change it. dynx reads springs, and its quantities include them with ``joint_dynamics=True``. The doctor
+    compares the rigid bodies alone. No call removes the force element from Drake. So the report gives as the
+    effect the difference that remains after all other causes are removed.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -256,14 +254,14 @@ class EmptyDynamicsOfSdf(EditingRule):
     """DX707 empty-dynamics-of-sdf: A dynamics element of SDF has neither damping nor friction, for which
     PyBullet refuses the file.
 
-    ``<dynamics>`` of an ``<axis>`` may hold a spring alone. Damping and friction are then 0.
+    In ``<dynamics>`` of an ``<axis>``, ``<damping>`` and ``<friction>`` are optional, with the default 0. For
+    example, the element may contain only a spring.
 
-    - Drake 1.51 reads it so.
-    - PyBullet 3.2.7 (``loadSDF``) refuses the whole file: "joint dynamics element specified with no damping
-      and no friction". It does the same for URDF (DX305).
+    - Drake 1.51 reads the file.
+    - PyBullet 3.2.7 (``loadSDF``) refuses the file: "joint dynamics element specified with no damping and no
+      friction". It also refuses such URDF files (DX305).
 
-    What to do: write ``<damping>0</damping>``. ``dynx doctor --fix`` does so. Nothing else changes in the
-    element.
+    What to do: write ``<damping>0</damping>``, as ``dynx doctor --fix`` does.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -289,13 +287,13 @@ class IncludeOfSdf(Rule):
     ``<include><uri>model://arm</uri></include>`` adds the model of another file.
 
     - Drake 1.51 reads the file that the URI names (DX711).
-    - PyBullet 3.2.7 (``loadSDF``) skips the element without a message. It refuses a file without other links:
-      "Cannot load SDF file".
+    - PyBullet 3.2.7 (``loadSDF``) ignores the element without a message. It refuses a file that has no other
+      links: "Cannot load SDF file".
 
     The robot lacks the links and joints of the other file.
 
-    What to do: convert the file to one that has all links (``dynx convert --to urdf`` or ``--to sdf``).
-    ``dynx doctor --fix`` does not change it.
+    What to do: write a file with all links (``dynx convert --to urdf`` or ``--to sdf``). ``dynx doctor
+    --fix`` does not change the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -320,14 +318,15 @@ def _uri(case: Case, include: SourceElement) -> str:
 class SeveralRootsOfSdf(Rule):
     """DX709 several-roots-of-sdf: Several links of a model are the child of no joint, and PyBullet crashes.
 
-    A static model of SDF may have links that no joint connects: all of them are fixed to the world.
+    A static model of SDF may have links that no joint connects. All links of a static model are fixed to the
+    world.
 
-    - Drake 1.51 welds each of them to its world.
-    - PyBullet 3.2.7 (``loadSDF``) writes "URDF file with multiple root links found", and then the process
+    - Drake 1.51 fixes each of these links to its world.
+    - PyBullet 3.2.7 (``loadSDF``) prints "URDF file with multiple root links found", and then the process
       ends with a segmentation fault.
 
-    What to do: connect the links by fixed joints, or convert the file to URDF, which has them (``dynx convert
-    --to urdf``). ``dynx doctor --fix`` does not change it.
+    What to do: connect the links by fixed joints. Or convert the file to URDF (``dynx convert --to urdf``),
+    which adds such joints. ``dynx doctor --fix`` does not change the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -352,17 +351,17 @@ class SharedNameOfSdf(EditingRule):
     """DX710 shared-name-of-sdf: Two parts of one model or link have the same name, for which Drake refuses
     the file.
 
-    Names of links, joints and frames must differ within a model, and those of collisions and of visuals
-    within a link. Older files have a joint with the name of its link, a joint called ``world``, which is the
-    name of the world, or two visuals called ``visual``.
+    Within a model, the names of links, joints and frames must differ. Within a link, the names of collisions
+    must differ, and the names of visuals must differ. Older files violate this: a joint has the name of its
+    link, a joint is called ``world``, or two visuals are called ``visual``.
 
-    - Drake 1.51 refuses the whole file: "Non-unique name", "The supplied joint name [world] is reserved" or
-      "visual with name[visual] already exists".
-    - PyBullet 3.2.7 (``loadSDF``) loads it.
+    - Drake 1.51 refuses the file: "Non-unique name", "The supplied joint name [world] is reserved" or "visual
+      with name[visual] already exists".
+    - PyBullet 3.2.7 (``loadSDF``) loads the file.
 
-    What to do: give the second part another name. ``dynx doctor --fix`` does so for joints and shapes, in
-    mimic joints too. Programs that look a joint up by its name must be changed with it. Names that frames
-    share with links are not looked for.
+    What to do: give the second part another name. ``dynx doctor --fix`` renames joints and shapes, also in
+    mimic joints. If a program looks a joint up by its name, change the program, too. The rule does not
+    examine names of frames.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -415,16 +414,16 @@ def _shapes_of_one_name(case: Case, link: SourceElement) -> Iterator[Correction]
 class ModelsInOtherFolders(CallingRule):
     """DX711 models-in-other-folders: The file includes a model by its name, which Drake does not search for.
 
-    ``model://arm`` is a folder with the name ``arm`` or a ``model.config``. Gazebo searches for it in the
-    folders of ``GZ_SIM_RESOURCE_PATH``, dynx around the file and in ``package_dirs``.
+    ``model://arm`` is a folder ``arm``, or a folder whose ``model.config`` has this name. Gazebo searches for
+    it in the folders of ``GZ_SIM_RESOURCE_PATH``. dynx searches around the file and in ``package_dirs``.
 
-    - Drake 1.51 knows the folders in the ``package_map`` of its parser alone, and refuses the file: "Unable
-      to find uri". With the folder it reads ``model://arm/`` and ``model://arm/model.sdf``, but not
-      ``model://arm``.
-    - PyBullet 3.2.7 (``loadSDF``) leaves out what a file includes (DX708).
+    - Drake 1.51 searches only in the ``package_map`` of its parser. If the folder is not there, it refuses
+      the file ("Unable to find uri"). Otherwise it reads ``model://arm/`` and ``model://arm/model.sdf``, but
+      not ``model://arm``.
+    - PyBullet 3.2.7 (``loadSDF``) ignores ``<include>`` (DX708).
 
-    What to do: end the URI with a slash, as ``dynx doctor --fix`` does, and add each folder to the package
-    map before the file is read; doctor prints the call.
+    What to do: end the URI with a slash, as ``dynx doctor --fix`` does. Add each folder to the package map
+    before Drake reads the file; the doctor prints this call.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -464,13 +463,14 @@ class ProductsOfInertiaOfSdf(Rule):
     ``<ixy>``, ``<ixz>`` and ``<iyz>`` are the products of inertia in the frame of the inertial.
 
     - Drake 1.51 reads them.
-    - PyBullet 3.2.7 (``loadSDF``) reads no moments at all (DX701), and ``changeDynamics`` sets three, about
-      the axes of the inertial. The products are lost.
+    - PyBullet 3.2.7 (``loadSDF``) does not read the tensor (DX701). ``changeDynamics`` sets three moments,
+      about the axes of the inertial. The products of inertia are lost.
 
-    The effect is as large as the products are beside the moments.
+    The effect is as large as the products of inertia, relative to the moments.
 
-    What to do: turn the frame of the inertial into the principal axes: ``<pose>`` of ``<inertial>``. ``dynx
-    convert --to urdf`` writes a file whose tensors PyBullet reads. ``dynx doctor --fix`` does not change it.
+    What to do: rotate the frame of the inertial into the principal axes (``<pose>`` of ``<inertial>``). Or
+    write a URDF file by ``dynx convert --to urdf``; PyBullet reads its tensors. ``dynx doctor --fix`` does
+    not change the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)

@@ -26,18 +26,17 @@ from dynx.rules.numbers_in_text import decimal
 class UnknownCollisionShape(EditingRule):
     """DX417 unknown-collision-shape: A collision has a shape that not every engine knows.
 
-    ``<plane>`` and ``<cdf>`` are PyBullet's extensions to URDF, whose shapes are box, sphere, cylinder and
-    mesh (and capsule in later versions).
+    The shapes of URDF are box, sphere, cylinder and mesh (and capsule in later versions). ``<plane>`` and
+    ``<cdf>`` are extensions of PyBullet.
 
-    - MuJoCo 4.0 refuses the file: "visual geometry specification not found", also for a collision.
-    - Pinocchio 4.1 drops the shape with a line on stderr. Drake 1.51 warns about it or ignores it.
-    - PyBullet 3.2.7 reads it.
+    - MuJoCo 4.0 refuses the file ("visual geometry specification not found", also for a collision).
+    - Pinocchio 4.1 drops the shape with a line on stderr. Drake 1.51 prints a warning or ignores the shape.
+    - PyBullet 3.2.7 reads the shape.
 
-    The dynamics of a link that states its inertia does not depend on shapes. But some engines refuse the
-    file.
+    If a link states its inertia, its dynamics does not depend on shapes. But MuJoCo refuses the file.
 
-    What to do: write the shape as a box or a mesh where you need it in other engines. ``dynx doctor --fix``
-    removes the ``<collision>``. ``--choose DX417=keep`` keeps it, and MuJoCo refuses the file.
+    What to do: if you need the shape in other engines, write it as a box or a mesh. ``dynx doctor --fix``
+    removes the ``<collision>``. ``--choose DX417=keep`` keeps it; MuJoCo then refuses the file.
     """
 
     stage = "reading"
@@ -62,18 +61,18 @@ class UnknownCollisionShape(EditingRule):
 class ShapeWithoutGeometry(EditingRule):
     """DX424 shape-without-geometry: A visual or collision has no geometry, or one that no engine knows.
 
-    ``<collision/>``, ``<visual><geometry/></visual>`` or a ``<geometry>`` with an element of another format:
-    a template was not filled in, or an exporter had no shape.
+    Examples are ``<collision/>``, ``<visual><geometry/></visual>``, and a ``<geometry>`` with an element of
+    another format. Usually a template was not filled in, or an exporter had no shape.
 
-    - PyBullet 3.2.7 refuses the file ("Cannot load URDF file"), also for a visual.
-    - MuJoCo 4.0 refuses it for a collision ("geometry specification not found") and ignores the visual.
-    - Pinocchio 4.1 drops the shape with a line on stderr. Drake 1.51 warns about it or ignores it.
+    - PyBullet 3.2.7 refuses the file ("Cannot load URDF file").
+    - MuJoCo 4.0 refuses such a collision ("geometry specification not found"), and ignores such a visual.
+    - Pinocchio 4.1 drops the shape with a line on stderr. Drake 1.51 prints a warning or ignores the shape.
 
-    The dynamics of a link that states its inertia does not depend on shapes. But some engines refuse the
-    file. The shapes ``<plane>`` and ``<cdf>``, which PyBullet alone reads, are DX417.
+    If a link states its inertia, its dynamics does not depend on shapes. But some engines refuse the file.
+    The shapes ``<plane>`` and ``<cdf>``, which only PyBullet reads, are DX417.
 
-    What to do: remove the element, or give it a geometry. ``dynx doctor --fix`` removes it.
-    ``--choose DX424=keep`` keeps it, and engines refuse the file.
+    What to do: remove the element, or write its geometry. ``dynx doctor --fix`` removes the element.
+    ``--choose DX424=keep`` keeps it; engines then refuse the file.
     """
 
     stage = "reading"
@@ -114,25 +113,24 @@ class CollisionShapeWithoutSize(EditingRule):
     has no file.
 
     Exporters and templates write ``<box size="0 0 0"/>``, ``<sphere radius="0"/>`` or ``<mesh filename=""/>``
-    for a link that has no shape, and a plate gets a thickness of zero.
+    for a link that has no shape. Or the thickness of a plate is zero.
 
     - MuJoCo 4.0 refuses the file if a size of a box, sphere, cylinder or capsule is not positive ("size 0
-      must be positive in geom"). It also refuses a missing attribute ("required attribute missing"). Every
-      positive size will do, however small.
-    - PyBullet 3.2.7 reads sizes of zero and below. It refuses the file ("Cannot load URDF file") where the
-      attribute is missing.
-    - Both refuse a ``<mesh>`` without ``filename``, or with an empty one.
-    - Drake 1.51 reads shapes only into a scene graph. Then a size that is not positive, of a visual shape
-      too, raises ``SystemExit``, which ends the program. It accepts a sphere of radius zero.
+      must be positive in geom"). It accepts any positive size, however small. It also refuses a missing
+      attribute ("required attribute missing").
+    - PyBullet 3.2.7 accepts sizes of zero and negative sizes. If the attribute is missing, it refuses the
+      file ("Cannot load URDF file").
+    - MuJoCo and PyBullet refuse a ``<mesh>`` without ``filename``, or with an empty ``filename``.
+    - Drake 1.51 reads shapes only into a scene graph. Then a size that is not positive, also of a visual
+      shape, raises ``SystemExit``, which ends the program. Drake accepts a sphere of radius zero.
     - Pinocchio 4.1 reads no shapes into a model.
 
-    The dynamics of a link that states its inertia does not depend on shapes. But some engines refuse the
-    file.
+    If a link states its inertia, its dynamics does not depend on shapes. But some engines refuse the file.
 
-    What to do: remove the shape, or give it its size. ``dynx doctor --fix`` removes the sign of a negative
-    size, and the ``<collision>`` where a size is zero or missing. ``--choose DX425=thicken`` writes 1e-6 m
-    for each size of zero instead, which keeps the contacts of a plate. It still removes a shape of which a
-    size or the file is missing. ``--choose DX425=keep`` keeps the file, and MuJoCo refuses it.
+    What to do: remove the shape, or write its size. ``dynx doctor --fix`` removes the sign of a negative
+    size. If a size is zero or missing, it removes the ``<collision>``. ``--choose DX425=thicken`` writes 1e-6
+    m for each size of zero instead, which keeps the contacts of a plate. It still removes a shape if a size
+    or the file is missing. ``--choose DX425=keep`` keeps the file; MuJoCo then refuses it.
     """
 
     stage = "reading"
@@ -196,22 +194,23 @@ def _sizes_in(shape: SourceElement, name: str) -> tuple[float, ...] | None:
 class VisualIncomplete(EditingRule):
     """DX428 visual-incomplete: A visual lacks a size, a mesh file, or the name or colour of its material.
 
-    Dynamics does not depend on visuals. But some engines refuse the file. Engines read the first shape and
-    the first material of each.
+    The dynamics does not depend on visuals. But some engines refuse the file. Of each visual, engines read
+    the first shape and the first material.
 
     - PyBullet 3.2.7 refuses the file ("Cannot load URDF file") for a ``<box>`` without ``size``, a
       ``<sphere>`` without ``radius``, and a ``<cylinder>`` or ``<capsule>`` without ``radius`` or ``length``.
       It also refuses a ``<mesh>`` without ``filename`` or with an empty one, and a ``<material>`` without
       ``name``.
-    - MuJoCo 4.0 refuses it for a ``<color>`` whose ``rgba`` is missing or not four numbers ("attribute 'rgba'
-      does not have enough data"), and for a ``<material>`` with neither name nor colour.
-    - Pinocchio 4.1 and Drake 1.51 load the robot: they read no visuals into a model without geometry.
+    - MuJoCo 4.0 refuses a ``<color>`` whose ``rgba`` is missing or not four numbers ("attribute 'rgba' does
+      not have enough data"), and a ``<material>`` with neither name nor colour.
+    - Pinocchio 4.1 and Drake 1.51 load the robot, because they read no visuals into a model without geometry.
 
-    A collision without its size is DX425, a material directly in the robot DX427, a second material DX411.
+    For a collision without its size see DX425, for a material directly in ``<robot>`` DX427, and for a second
+    material DX411.
 
-    What to do: write what is missing. ``dynx doctor --fix`` removes a visual whose shape is incomplete, and
-    gives a material a name or a grey colour. ``--choose DX428=keep`` keeps the file as it is, and engines
-    refuse it.
+    What to do: complete the visual. ``dynx doctor --fix`` removes a visual with an incomplete shape, and
+    gives an incomplete material a name or a grey colour. ``--choose DX428=keep`` keeps the file as it is;
+    engines then refuse it.
     """
 
     stage = "reading"
@@ -246,22 +245,25 @@ class MeshNotFound(Rule):
     """DX516 mesh-not-found: The file of a mesh, or of the texture of a visual, is not where the description
     says.
 
-    The rule reports files whose location is certain: a path relative to the description, a ``file://`` path,
-    or a file that is missing in a package that was found. dynx looks for packages in the folders above the
-    description, in ROS_PACKAGE_PATH and in AMENT_PREFIX_PATH. On a case-sensitive file system ``Base.STL`` is
-    not ``base.stl``. Paths that leave the package or repository of the description are not looked at.
+    The rule reports a missing file only if dynx knows where it should be: a path relative to the robot file,
+    a ``file://`` path, or a path in a package that dynx found. dynx looks for packages in the folders above
+    the robot file, in ROS_PACKAGE_PATH and in AMENT_PREFIX_PATH. On a case-sensitive file system ``Base.STL``
+    is not ``base.stl``. dynx does not examine paths that leave the package or repository of the robot file.
 
-    PyBullet 3.2.7 refuses the whole file ("Cannot load URDF file") for a mesh in ``<visual>`` or in
-    ``<collision>``, and so does Drake 1.51 with a scene graph. MuJoCo 4.0 refuses it for ``<collision>``
-    alone, because it discards visual shapes. Only Drake with a scene graph misses a texture in ``<visual>``.
-    A missing texture in a material of the robot is DX426. Pinocchio's ``buildModelFromUrdf`` reads no mesh,
-    its ``buildGeomFromUrdf`` raises. PyBullet takes every path, ``/meshes/a.stl`` too, as relative to the
-    folder of the description and to each folder above it. It also searches folders of its own
-    (``setAdditionalSearchPath``), so it may find meshes that other engines do not find. The message says
-    which file it finds in the package or repository. Dynamics does not depend on shapes, and dynx reads the
-    file without them.
+    - PyBullet 3.2.7 refuses the robot file ("Cannot load URDF file") if a mesh in ``<visual>`` or
+      ``<collision>`` is missing. It reads every path, also ``/meshes/a.stl``, as relative to the folder of
+      the robot file and to each folder above it. It also searches folders of its own
+      (``setAdditionalSearchPath``). So it may find meshes that other engines do not find. The message names
+      the file that PyBullet finds in the package or repository.
+    - Drake 1.51 refuses the robot file only with a scene graph. It then also needs the textures in
+      ``<visual>``.
+    - MuJoCo 4.0 refuses the robot file if a mesh in ``<collision>`` is missing. It ignores visual shapes.
+    - Pinocchio's ``buildModelFromUrdf`` reads no mesh. Its ``buildGeomFromUrdf`` raises an error.
 
-    The description does not say which file was meant, so no edit removes the cause. The message gives the
+    A missing texture in a material directly in ``<robot>`` is DX426. The dynamics does not depend on shapes,
+    and dynx reads the file without them.
+
+    dynx does not know which file the author meant, so no edit removes the cause. The message gives the
     nearest name.
     """
 

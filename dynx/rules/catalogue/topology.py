@@ -18,25 +18,25 @@ from dynx.rules.joints import TYPES, fresh_name, joint_split, joints_of_type, sp
 class JointOfSeveralFreedoms(EditingRule):
     """DX210 joint-of-several-freedoms: A joint is spherical, planar or floating.
 
-    URDF knows ``planar`` and ``floating``. ``spherical`` and ``ball`` are extensions. No other feature is
-    read in so many different ways:
+    URDF has the types ``planar`` and ``floating``. The types ``spherical`` and ``ball`` are extensions.
+    Engines read these types in many different ways:
 
-    - ``spherical``: Pinocchio 4.1 and Drake 1.51 refuse the file. PyBullet 3.2.7 reads it. Mass matrix and
-      inverse dynamics then have other coordinates than the joint states or fail. MuJoCo 4.0 reads it with
-      quaternions, and refuses the usual limits on it. No engine reads ``ball``.
-    - ``planar``: Pinocchio has (x, y, cos, sin), MuJoCo and Drake three joints or coordinates. PyBullet moves
-      it but cannot do dynamics.
-    - ``floating`` in the middle of a tree: Pinocchio has a quaternion. PyBullet makes the joint FIXED and
-      prints one line on stdout. MuJoCo and Drake refuse it or leave the link free in the world.
+    - ``spherical``: Pinocchio 4.1 and Drake 1.51 refuse the file. PyBullet 3.2.7 reads it, but mass matrix
+      and inverse dynamics fail, or have other coordinates than the state of the joint. MuJoCo 4.0 reads the
+      joint with a quaternion, but refuses the usual limits of such a joint. No engine reads ``ball``.
+    - ``planar``: Pinocchio has the coordinates (x, y, cos, sin). MuJoCo and Drake have three joints or
+      coordinates. PyBullet moves the joint, but has no dynamics for it.
+    - ``floating`` in the middle of a tree: Pinocchio has a quaternion. PyBullet makes the joint fixed, and
+      prints one line on stdout. MuJoCo and Drake refuse the file, or leave the link free in the world.
 
-    dynx has no such joint and refuses the file.
+    dynx refuses such a joint in URDF.
 
-    What to do: write joints of one degree of freedom each, with massless links between them.
-    ``dynx doctor --fix`` does so: three rotations for a spherical joint, two translations and a rotation for
-    a planar one, three of each for a floating one. The chain has the same motion. Its coordinates are angles,
-    singular where the middle angle is 90 degrees, and limits of the joint are dropped. MuJoCo refuses
-    massless links that move (DX110), so the links in between weigh 2e-15 kg. ``--choose DX210=fixed`` makes
-    the joint fixed instead.
+    What to do: write joints of one degree of freedom each, with massless links between them. ``dynx doctor
+    --fix`` writes three rotations for a spherical joint, two translations and a rotation for a planar joint,
+    and three translations and three rotations for a floating joint. The chain has the same motion. Its
+    coordinates are angles, which are singular if the middle angle is 90 degrees. The limits of the joint are
+    dropped. MuJoCo refuses massless links that move (DX110), so the links in between have 2e-15 kg.
+    ``--choose DX210=fixed`` makes the joint fixed instead.
     """
 
     stage = "reading"
@@ -65,21 +65,21 @@ class FloatingJointAtRoot(EditingRule):
     """DX211 floating-joint-at-root: A floating joint below an empty root specifies a floating base in the
     file.
 
-    Some files describe a floating robot in this way: a link ``world`` without inertia, a joint of type
-    ``floating``, and the robot below it. The base is then specified twice, in the file and in the call that
-    loads it.
+    Some files describe a floating robot in this way: the root is a link ``world`` without inertia, and a
+    joint of type ``floating`` connects the robot to it. Then both the file and the call that loads it state
+    whether the base floats.
 
     - PyBullet 3.2.7 makes the joint fixed, and prints one line on stdout. Then ``useFixedBase`` decides.
     - Pinocchio 4.1 gives the joint seven coordinates. ``JointModelFreeFlyer`` as a root joint gives seven
-      more. The other joints are right as long as the seven are held.
-    - MuJoCo 4.0 makes it a free joint whatever is below.
-    - Drake 1.51 does not know the type. It leaves the child free in the world and its quaternion at zero.
+      more. The dynamics of the other joints is right if you hold the first seven coordinates.
+    - MuJoCo 4.0 makes it a free joint.
+    - Drake 1.51 does not support the type. It leaves the child free in the world, with a quaternion of zeros.
 
-    dynx reads the joint as fixed and leaves the decision to ``base=``.
+    dynx reads the joint as fixed; the argument ``base`` decides.
 
-    What to do: specify the base in one place. ``dynx doctor --fix`` makes the joint fixed. Engines that read
-    a floating base from the file then fix the robot to the world, unless the call says otherwise. So the
-    change counts as a change of the physics (``--level physics``).
+    What to do: specify the base only in the call. ``dynx doctor --fix`` makes the joint fixed. An engine that
+    takes the floating base from the file then fixes the robot to the world, unless the call says otherwise.
+    So this counts as a change of the physics (``--level physics``).
     """
 
     # Before the rules about inertia, which may give the empty root a body.
@@ -100,19 +100,19 @@ class FloatingJointAtRoot(EditingRule):
 class TooManyJoints(Rule):
     """DX212 too-many-joints: The robot has more joints than PyBullet supports.
 
-    PyBullet 3.2.7 has room for 127 joints, and counts fixed ones. From the 128th on ``getJointState`` and
-    ``getLinkState`` fail, so there are no positions. Above 128 coordinates ``calculateInverseDynamics``,
-    ``calculateMassMatrix`` and ``calculateJacobian`` return wrong results without a warning (20 % at 129).
-    Hands with sensors and robots with many named frames exceed this: ``tiago_dual`` of example-robot-data has
-    129 joints.
+    PyBullet 3.2.7 supports 127 joints, including fixed joints. For further joints ``getJointState`` and
+    ``getLinkState`` fail, so there are no positions. Above 128 coordinates, ``calculateInverseDynamics``,
+    ``calculateMassMatrix`` and ``calculateJacobian`` return wrong results without a warning (an error of 20 %
+    at 129 coordinates). Hands with sensors and robots with many named frames exceed this number:
+    ``tiago_dual`` of example-robot-data has 129 joints.
 
     Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 have no such limit.
 
-    What to do: drop frames that PyBullet does not need. ``dynx doctor --fix`` removes links that have no
-    mass, nothing attached to them and a fixed joint: that is, frames. It removes as few as are needed, those
-    without shapes and at the end of the file first. The dynamics is unchanged. Programs that use these frames
-    need the original file. ``--choose DX212=keep`` keeps them, and PyBullet cannot load the robot. Where
-    there are not enough of them, or too many joints move, there is no remedy.
+    What to do: drop frames that PyBullet does not need. Here a frame is a link at the end of a chain, without
+    mass, on a fixed joint. ``dynx doctor --fix`` removes frames until 127 joints remain. It first removes
+    frames without shapes, and begins at the end of the file. The dynamics does not change. Programs that use
+    these frames need the original file. ``--choose DX212=keep`` keeps the frames, and PyBullet cannot load
+    the robot. If the file has too few such frames, or more than 127 joints move, there is no remedy.
     """
 
     advice = "Drop links that are mere frames from the file for PyBullet."
@@ -180,18 +180,18 @@ def _has_inertia(link: Link) -> bool:
 class LoopJoint(EditingRule):
     """DX220 loop-joint: A ``<loop_joint>`` closes a kinematic loop, which URDF cannot express.
 
-    ``<loop_joint>`` is an extension of a few programs, such as Isaac Sim and the predecessor of Drake's
-    ``MultibodyPlant``. It names two links (``<link1>``, ``<link2>``) that are held together, although a robot
-    in URDF is a tree.
+    A robot in URDF is a tree. ``<loop_joint>`` is an extension of a few programs, such as Isaac Sim and the
+    predecessor of Drake's ``MultibodyPlant``. It connects two further links (``<link1>``, ``<link2>``), and
+    so closes a loop.
 
     - Drake 1.51 refuses the file: "loop joints are not supported in MultibodyPlant".
-    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore it without a warning and load the open tree. So does
-      dynx, with a note.
+    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore the element without a warning, and load the open
+      tree. dynx does the same, with a note.
 
-    What to do: close the loop in the program, by the constraint that your engine has (``createConstraint`` in
+    What to do: close the loop in your program, by a constraint of your engine (``createConstraint`` in
     PyBullet, ``<equality>`` in MJCF, a ball or weld constraint in Drake and Pinocchio). ``dynx doctor --fix``
-    removes the element, which leaves the tree that three engines load. ``--choose DX220=keep`` keeps it for
-    the programs that read it, and Drake refuses the file.
+    removes the element, so that all engines load the open tree. ``--choose DX220=keep`` keeps the element for
+    programs that read it; Drake then refuses the file.
     """
 
     stage = "reading"
@@ -217,15 +217,16 @@ _WORLD = "world"
 class WorldNotDeclared(EditingRule):
     """DX221 world-not-declared: A joint has the parent ``world``, which is not a link of the file.
 
-    In Drake a link named ``world`` is the world itself and need not be declared, so a file written for Drake
-    fixes its first link by ``<parent link="world"/>`` alone. In URDF every parent is a link of the file.
+    In Drake the link ``world`` is the world itself, and a file need not declare it. So a file written for
+    Drake may fix its first link only by ``<parent link="world"/>``. In URDF every parent must be a link of
+    the file.
 
     - Drake 1.51 reads the file, and attaches the joint to its world.
-    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 refuse it: no link has that name. So does dynx.
+    - Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and dynx refuse the file, because no link has this name.
 
-    What to do: declare ``<link name="world"/>``. ``dynx doctor --fix`` does so, at the beginning of the
-    robot. All engines then read the robot that Drake reads: a root of this name on a fixed base is harmless
-    in all of them. Load such a robot with the fixed base. On a floating one the world would float, see DX109.
+    What to do: declare ``<link name="world"/>``. ``dynx doctor --fix`` declares it, at the beginning of the
+    robot. All engines then read the robot that Drake reads. Load such a robot with a fixed base. With a
+    floating base the link ``world`` would float, see DX109.
     """
 
     stage = "reading"
@@ -249,19 +250,19 @@ class WorldNotDeclared(EditingRule):
 class SeveralRootLinks(EditingRule):
     """DX223 several-root-links: A link is the child of no joint, and is not the root of the robot.
 
-    A robot in URDF is one tree. A link whose joint was forgotten or commented out, or a table that was added
-    to the file, is a second tree beside it.
+    A robot in URDF is one tree. If the joint of a link was forgotten or commented out, or a table was added
+    to the file, the file has a second tree.
 
     - Pinocchio 4.1 refuses the file ("two root links found"). PyBullet 3.2.7 ends the process with a crash.
     - MuJoCo 4.0 fixes every such link to its world, at the origin.
-    - Drake 1.51 reads each tree as a body of its own: in the call that fixes the root, the others float.
+    - Drake 1.51 loads all trees. The usual call fixes the root of one tree, and the other trees float.
 
-    dynx refuses the file: it reads one robot.
+    dynx refuses the file.
 
-    What to do: add the joint, or write two files. The file does not say where the link belongs, so
-    ``dynx doctor --fix`` attaches it to the root by a fixed joint without offset, as MuJoCo does.
-    ``--choose DX223=remove`` removes the smaller trees instead. The root is that of the tree with the most
-    links, of the first one where that leaves a choice.
+    What to do: add the joint, or write two files. The file does not say where the link belongs, so ``dynx
+    doctor --fix`` attaches it to the root by a fixed joint without offset, as MuJoCo does. ``--choose
+    DX223=remove`` removes the smaller trees instead. In both cases the tree with the most links keeps its
+    root. If several trees have this number of links, it is the first of them.
     """
 
     stage = "reading"
@@ -333,17 +334,19 @@ _JOINT_TAG = "drake:joint"
 class JointOfDrake(EditingRule):
     """DX227 joint-of-drake: A <drake:joint> joins two links in one engine and is not there in the others.
 
-    Drake has joints that URDF lacks: ball, universal, planar, screw and curvilinear ones. A file states them
-    in elements of their own, ``<drake:joint name="..." type="ball">``, with the children of a ``<joint>``.
+    Drake has joints that URDF lacks: ball, universal, planar, screw and curvilinear joints. A file states
+    such a joint in the element ``<drake:joint name="..." type="ball">``, with the same children as
+    ``<joint>``.
 
-    - Drake 1.51.1 adds the joint.
-    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 skip the element. So does dynx, with a note. The child is
-      then the root of a tree of its own (DX223), unless another joint carries it. Drake refuses the file in
-      that case ("form one or more loops").
+    - Drake 1.51.1 adds the joint. If another joint already has the same child link, it refuses the file
+      ("form one or more loops").
+    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore the element, and dynx ignores it with a note.
+      Without another joint, the child link is then the root of a second tree (DX223).
 
-    What to do: write joints that URDF has, in a chain with small links between them (see DX210), or use the
-    file with Drake alone. No chain is a screw, so ``dynx doctor --fix`` removes the element, and DX223 then
-    attaches the child. ``--choose DX227=keep`` keeps it, and Drake loads another robot than the rest.
+    What to do: write a chain of URDF joints with small links between them (see DX210), or use the file with
+    Drake alone. ``dynx doctor --fix`` removes the element, because a chain cannot replace every type, such as
+    a screw. The remedy of DX223 then attaches the child link. ``--choose DX227=keep`` keeps the element;
+    Drake then loads another robot than the other engines.
     """
 
     stage = "reading"

@@ -15,12 +15,12 @@ class TransmissionOfNothing(EditingRule):
 
     Transmissions belong to ROS and its controllers. Of the engines only Drake reads them:
 
-    - Drake 1.51 refuses the file where a transmission has no type, no ``<joint>`` or no ``<actuator>`` with a
+    - Drake 1.51 refuses the file if a transmission has no type, no ``<joint>`` or no ``<actuator>`` with a
       name, or names a joint that the file does not have. It ignores types other than ``SimpleTransmission``.
     - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore transmissions.
 
-    What to do: complete the transmission or remove it. ``dynx doctor --fix`` removes it. Nothing in the
-    dynamics depends on it. If ROS controllers should use it, complete it instead.
+    What to do: if ROS controllers use the transmission, complete it; otherwise remove it. ``dynx doctor
+    --fix`` removes it. The dynamics does not depend on it.
     """
 
     stage = "reading"
@@ -54,18 +54,17 @@ def _transmission_fault(case: Case, transmission: SourceElement) -> str | None:
 class ActuatorNamedTwice(EditingRule):
     """DX215 actuator-named-twice: The actuators of two transmissions have the same name.
 
-    Transmissions belong to ROS, where each is independent. Drake 1.51 reads them and makes an actuator of
-    each, whose names must be unique: it refuses the file, "already contains a joint actuator named".
+    Transmissions belong to ROS, where two of them may have actuators of the same name. Drake 1.51 adds an
+    actuator for each transmission, and refuses a second actuator of the same name ("already contains a joint
+    actuator named"). Drake ignores transmissions of fixed joints, of joints with an effort limit of 0, and of
+    other types than ``SimpleTransmission``. Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore all
+    transmissions.
 
-    Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore transmissions.
+    Usually someone copied a transmission and changed only the joint. For example, ``xarm6_robot.urdf``, which
+    comes with PyBullet, has two actuators ``motor3``.
 
-    Transmissions of fixed joints, of joints with an effort limit of 0, and of other types than
-    ``SimpleTransmission`` are ignored.
-
-    A copied transmission of which only the joint was changed causes this. ``xarm6_robot.urdf``, which comes
-    with PyBullet, has two actuators ``motor3``.
-
-    What to do: give each actuator its own name. ``dynx doctor --fix`` adds a number to the later ones.
+    What to do: give each actuator its own name. ``dynx doctor --fix`` adds a number to the second and later
+    names.
     """
 
     stage = "reading"

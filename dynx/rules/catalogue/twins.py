@@ -59,49 +59,49 @@ class TwinsDiffer(Rule):
     """DX521 twins-differ: A left and a right link differ in mass, inertia, centre of mass, distance of the
     joint, or limits.
 
-    Twins are links whose names differ in words such as ``left`` and ``right``, ``L`` and ``R``, ``FL`` and
-    ``FR``, on joints of one type. Numbers that neither a reflection nor another choice of link frames changes
-    are always compared. Where the joints are equally far from their parents (to 1 %), these are the mass, the
-    principal moments and the distance of the centre of mass from the joint. Reported are masses or moments
-    that differ by more than 10 %, and distances that differ by more than 10 % and 5 mm.
+    *Twins* are links whose names differ only in words such as ``left`` and ``right``, ``L`` and ``R``, ``FL``
+    and ``FR``, and whose joints have the same type. The rule compares the following numbers of twins.
 
-    If the joints are not equally far, links are twins under three conditions. Their joints rotate, their
-    parents are one link or twins by name, and masses (to 1 %), moments and centres of mass are alike.
-    Reported are distances of the joints that differ by more than 1 % and 1 mm. (The zero of a sliding joint
-    may be anywhere along it.) They are not reported where several twins lie about one plane, and the origin
-    of their parent's frame, but not its centre of mass, is beside it.
+    Mass, principal moments, and the distance of the centre of mass from the joint: they do not depend on the
+    side or on the choice of link frames. The rule compares them if both joints have the same distance from
+    their parents (to 1 %). It reports masses or moments that differ by more than 10 %, and distances that
+    differ by more than 10 % and 5 mm.
 
-    Limits of effort and velocity, and widths of ranges, are reported if they differ by more than 1 %, and
-    widths by more than 0.01 rad or m. A joint that mimics another is left out: it moves as that one does.
+    Distances of the joints from their parents: the rule compares them if the joints rotate, the parents are
+    one link or twins by name, and masses (to 1 %), moments and centres of mass are alike. It reports
+    distances that differ by more than 1 % and 1 mm. There is one exception: the twins lie about one plane,
+    and this plane contains the centre of mass of the parent but not the origin of the parent's frame.
 
-    Numbers with a sign are compared with every joint at zero, in the axes of the root, after a reflection at
-    the plane between the twins. This requires that places and axes of their joints, and of their children's
-    joints, are reflections (to 1 mm and 1 %). Together with the centre of mass they must show how a link is
-    turned about its joint. Otherwise these numbers are not compared.
+    Limits: the rule reports limits of effort and velocity, and widths of ranges, that differ by more than 1
+    %, and widths only if they also differ by more than 0.01 rad or m. It leaves out mimic joints.
 
-    - The products of inertia are reported if they differ by more than 5 % of the largest moment. A part may
-      also be the same on both sides, or be turned by half a turn. So the products may have the signs of any
-      reflection or half turn along these axes that agrees with the centres of mass. Where the products are
-      reflections, and the centres of mass none that agrees, the centres are reported.
-    - The range of a joint is reported if its ends differ by more than 1 % and 0.01 rad or m. The axes decide
-      what is expected. If the reflected posture has equal positions, as in a hip that pitches about y on both
-      sides, the ranges must be equal. If it has opposite positions, as in a hip that rolls about x, the range
-      goes from minus the upper end to minus the lower end.
+    Numbers with a sign, such as products of inertia: the rule reflects one twin at the plane between the
+    twins, and compares the numbers in the axes of the root, with every joint at zero. This requires that
+    positions and axes of their joints, and of their children's joints, are reflections (to 1 mm and 1 %).
+    Together with the centre of mass they must show how a link is rotated about its joint. Otherwise the rule
+    does not compare these numbers.
 
-    Of 69 files of example-robot-data 15 are reported. In six the moments of forearms or arms differ or are
-    exchanged, and in two those of one leg are zero. In four the limits of effort or velocity differ, such as
-    150 N m on the left and 1000 on the right. In four the products of an upper arm were copied with their
-    signs. In two the roll of both ankles has the range of a pitch. Of more than 1,000 files of pybullet_data
-    nine are. A bracket's centre of mass is at 2 cm on the left and at 3 cm on the right. The upper legs of
-    five Laikagos are 2 mm further from the hips on the left. Motors of two minitaurs are 2 and 26 mm further
-    from the body on one side. A biped has copied products, and an effort of 0 on one side.
+    - Products of inertia: the rule reports a difference of more than 5 % of the largest moment. The same part
+      may be on both sides, or it may be rotated by half a turn. So the rule accepts the signs of any
+      reflection or half turn along these axes that agrees with the centres of mass. If the products of
+      inertia are reflections and the centres of mass are not, it reports the centres of mass.
+    - The range of a joint: the rule reports limits that differ by more than 1 % and 0.01 rad or m. The axes
+      of the joints determine the expected range. For example, hips that pitch about y on both sides must have
+      equal ranges. For hips that roll about x, the lower limit of one must be minus the upper limit of the
+      other.
 
-    Usual causes: one side was measured or exported again and the other was not, a number has an extra digit,
-    or moments are in another unit. Or one of several signs of products of inertia was lost when the file was
-    reflected, or limits were copied without exchanging their ends.
+    The rule reports 15 of the 69 files of example-robot-data. In six files, the moments of forearms or arms
+    differ or are exchanged. In two, the moments of one leg are zero. In four, limits of effort or velocity
+    differ, such as 150 N m on the left and 1000 N m on the right. In four, the products of inertia of an
+    upper arm were copied without a change of sign. In two, the roll joint of both ankles has the range of a
+    pitch joint. The rule reports nine of more than 1,000 files of pybullet_data.
+
+    Usual causes: only one side was measured or exported again. Or a number has an extra digit, or moments are
+    in another unit. Or a sign of a product of inertia was lost when the file was reflected. Or limits were
+    copied without exchanging lower and upper.
 
     All engines use the numbers unchanged. The robot leans to one side, and a gait that was tuned on one leg
-    fails on the other. Where the parts differ (a tool in one hand), nothing is wrong.
+    fails on the other. If the two parts really differ, such as a tool in one hand, nothing is wrong.
 
     The file does not say which of the two is right, so no edit removes the cause.
     """
