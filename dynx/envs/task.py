@@ -31,7 +31,7 @@ from dynx.rbd.integration import Accelerate, ExplicitEuler, RungeKutta4, SemiImp
 from dynx.rbd.parameters import SPRING
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array
-from dynx.steppers.registry import WITHOUT_CONTACTS, world_names
+from dynx.steppers.registry import world_names
 from dynx.steppers.settings import checked_switches
 
 if TYPE_CHECKING:
@@ -471,8 +471,7 @@ class WorldTask(Task):
     @classmethod
     def engines(cls) -> tuple[str, ...]:
         """Return the names of the engines that run worlds with contacts, the default first."""
-        names = (name for name in world_names() if name not in WITHOUT_CONTACTS)
-        return tuple(dict.fromkeys((DEFAULT_WORLD_ENGINE, *names)))
+        return tuple(dict.fromkeys((DEFAULT_WORLD_ENGINE, *world_names())))
 
     def open(self, engine: str, joints: JointOptions = DESCRIBED) -> Episodes:
         """Return the episodes of this task in a world of an engine."""

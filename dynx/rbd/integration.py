@@ -78,14 +78,16 @@ class SemiImplicitEuler:
     def __init__(self, model: Model, h: float, center: Array | None = None) -> None:
         """`center` (3,) [m] is the centre of mass of the root, by default that of `model`."""
         self._floating = model.floating
-        self._balls = _balls_of(model)
+        self.balls = _balls_of(model)
+        """Indices in the positions of the joints at which the quaternions of ball joints begin."""
         self._h: Array = np.full(model.nv, h)
         self._step = h
         if center is None:
             root = model.mechanism.root
             mass = float(root.mass)
             center = np.array(root.first_moment, dtype=float) / mass if mass else np.zeros(3)
-        self._center = center
+        self.center = center
+        """Centre of mass (3,) of the root in the axes of the base frame [m]."""
 
     def __call__(self, accelerate: Accelerate, q: Array, v: Array, *given: Any) -> MotionState:
         """Take one step, on floats or on symbols."""
@@ -99,11 +101,11 @@ class SemiImplicitEuler:
         v = v + h * a
         if moves is not None:
             v = moves * v
-        return moved_joints(q, h * v, self._balls), v, a
+        return moved_joints(q, h * v, self.balls), v, a
 
     def _float(self, q: Array, v: Array, a: Array, moves: Array | None) -> MotionState:
         held = 1.0 if moves is None else moves[6:]
-        return *floating_step(q, v, a, self._step, self._center, held, self._balls), a
+        return *floating_step(q, v, a, self._step, self.center, held, self.balls), a
 
 
 class ExplicitEuler:
@@ -115,19 +117,19 @@ class ExplicitEuler:
     def __init__(self, model: Model, h: float) -> None:
         if model.floating:
             raise UnsupportedFeatureError("the integrator euler is for robots with a fixed base")
-        self._h, self._balls = h, _balls_of(model)
+        self._h, self.balls = h, _balls_of(model)
 
     def __call__(self, accelerate: Accelerate, q: Array, v: Array, *given: Any) -> MotionState:
         """Return q and v after the step, and the acceleration at its beginning."""
         a = accelerate(q, v, *given)
-        return moved_joints(q, self._h * v, self._balls), v + self._h * a, a
+        return moved_joints(q, self._h * v, self.balls), v + self._h * a, a
 
 
 class Flow:
     """Time derivative of the state y = (q, v); between steps its quaternions need not be of unit length."""
 
     def __init__(self, model: Model) -> None:
-        self._floating, self._balls = model.floating, model.ball_places
+        self._floating, self.balls = model.floating, model.ball_places
         self._quaternions = model.quaternions
         self.nq = model.nq
 
@@ -148,7 +150,7 @@ class Flow:
         if not self._quaternions:
             return np.concatenate([v, a])
         rates = []
-        for kind, of_q, of_v in coordinate_runs(self.nq, floating=self._floating, balls=self._balls):
+        for kind, of_q, of_v in coordinate_runs(self.nq, floating=self._floating, balls=self.balls):
             rate, omega = v[of_v], v[of_v][-3:]
             if kind == "base":
                 rates.append(rotate(rotation_from_quat(q[3:7]), rate[:3]))

@@ -33,7 +33,7 @@ class CompiledBaseEuler(SemiImplicitEuler):
         from dynx.steppers.step_kernels import base_kernel
 
         base = base_kernel().workspace()
-        base.input_rows[3][:], base.input_rows[4][:] = self._step, self._center
+        base.input_rows[3][:], base.input_rows[4][:] = self._step, self.center
         return base
 
     def _float(self, q: Array, v: Array, a: Array, moves: Array | None) -> MotionState:
@@ -47,7 +47,7 @@ class CompiledBaseEuler(SemiImplicitEuler):
         base.run()
         pose, twist = base.results
         joints = held * (v[6:] + h * a[6:])
-        moved = moved_joints(q[7:], h * joints, self._balls)
+        moved = moved_joints(q[7:], h * joints, self.balls)
         return np.concatenate([pose, moved]), np.concatenate([twist, joints]), a
 
 

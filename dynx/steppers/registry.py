@@ -33,9 +33,6 @@ BUILT_IN = {
 }
 """Engines of dynx itself."""
 
-WITHOUT_CONTACTS = frozenset({"dynx"})
-"""Those of `BUILT_IN` that have no contacts, by which they are told without an import."""
-
 _engines = ClassRegistry(
     "world engine", GROUP, BUILT_IN, lambda: Stepper, error=BackendError, unknown=UnknownBackendError
 )

@@ -12,7 +12,7 @@ from dynx.backends.dynamics import EngineDynamics
 from dynx.backends.hooks import solve_mass_matrix
 from dynx.model.elements import JointCoefficients
 from dynx.rbd.integration import ExplicitEuler, MotionState, RungeKutta4, SemiImplicitEuler
-from dynx.rbd.joint_friction import FrictionLaw
+from dynx.rbd.joint_friction import FrictionLaw, damped_equation
 from dynx.spatial.scalar import Array, Floats
 from dynx.steppers.implicit_joints import ImplicitJoints
 from dynx.steppers.integrators import Adaptive, CompiledBaseEuler
@@ -63,7 +63,7 @@ class RobotStep:
         """True if damping or dry friction is solved for at the end of each step."""
         self._h, self._add_load, self._springs = h, add_load, joints.springs
         self._armature = np.diag(joints.armature) if joints.armature.any() else None
-        self._damping = joints.damping
+        self._damping, self._inertia = joints.damping, joints.armature
         self._is_free = not self.sticks and all(
             each is None for each in (self._armature, add_load, self._springs)
         )
@@ -76,13 +76,36 @@ class RobotStep:
     def __call__(self, q: Floats, v: Floats, tau: Floats, t: float = 0.0) -> MotionState:
         """Return q and v after a step under the torque `tau` (nv,), which begins at `t` [s], and the
         acceleration at its beginning."""
+        if isinstance(self.scheme, SemiImplicitEuler):
+            return self.scheme.moved(q, v, *self.motion(q, v, tau, t))
         if self._is_free:
             return self.scheme(self.dynamics.forward_dynamics, q, v, tau)
         if not self.sticks:
             return self.scheme(self.acceleration, q, v, tau, t)
-        if isinstance(self.scheme, SemiImplicitEuler):
-            return self.scheme.moved(q, v, *self.slowed(q, v, tau, t))
         return self._step_in_modes(self.scheme, q, v, tau, t)
+
+    def motion(self, q: Floats, v: Floats, tau: Floats, t: float = 0.0) -> tuple[Floats, Floats | None]:
+        """Return the acceleration (nv,) of a step of semi-implicit Euler, and 1 for coordinates that move and
+        0 for those that stick (nv,); None where all move."""
+        if self._is_free:
+            return self.dynamics.forward_dynamics(q, v, tau), None
+        if not self.sticks:
+            return self.acceleration(q, v, tau, t), None
+        a, moves = self.slowed(q, v, tau, t)
+        return a, moves
+
+    def without_dry_friction(self, q: Floats, v: Floats, tau: Floats) -> tuple[Floats, Floats]:
+        """Return the acceleration (nv,) of a step of semi-implicit Euler without dry friction, and the matrix
+        A (nv, nv) that impulses act on: M with armature and the damping of the step."""
+        M, bias = self.dynamics.mass_matrix_and_bias(q, v)
+        rest = self._loaded(q, v, tau, 0.0) - bias
+        A, rest = damped_equation(M, rest, v, self._h, self._damping, self._inertia)
+        return solve_mass_matrix(A, rest), A
+
+    def inertia(self, q: Floats) -> Floats:
+        """Return the matrix A (nv, nv) that impulses act on: M with armature and the damping of the step."""
+        A: Floats = self.dynamics.mass_matrix(q) + np.diag(self._inertia + self._h * self._damping)
+        return A
 
     def traced(self, record: RecordCall, q: Array, v: Array, tau: Array) -> MotionState:
         """Take one step on symbols; `record(call, shape, *arguments)` stands for a call of the engine."""

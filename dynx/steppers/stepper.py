@@ -207,6 +207,10 @@ class Stepper(ABC):
         """Return the pairs of colliders that have a contact in `contacts`, in any order, also repeated."""
         return [(point.a, point.b) for point in self.contacts()]
 
+    def notes(self) -> Sequence[str]:
+        """Return a sentence for each kind of fault in the steps so far that the engine knows of."""
+        return ()
+
     # -- end ----------------------------------------------------------------------------------
 
     @property

@@ -274,8 +274,11 @@ class World:
         their limits, robots whose accelerations have no bound, parts that are too fast for the step,
         coefficients of contact that the engine does not have, joint dynamics that are not exact, a step that
         is long, angles of the scene that look like degrees, and given settings that the engine changes.
-        Targets of motors in later steps that look like degrees follow."""
-        return tuple(dict.fromkeys((*self._notes, *self._commands.notes())))
+        Targets of motors in later steps that look like degrees follow, and faults that the engine found in
+        its steps."""
+        engine = self._motion.ready
+        of_steps = () if engine is None else engine.notes()
+        return tuple(dict.fromkeys((*self._notes, *self._commands.notes(), *of_steps)))
 
     @property
     def version(self) -> str:

@@ -17,9 +17,9 @@ from dynx.world.scene.robots import LinkFrames
 from tests.world.engines import WORLDS
 from tests.world.standing import quadruped
 
-pytestmark = pytest.mark.parametrize("engine", WORLDS)
+pytestmark = pytest.mark.parametrize("engine", [*WORLDS, "dynx"])
 
-RESIDUAL = {"mujoco": 1e-8, "drake": 1e-4, "pybullet": 1e-2}
+RESIDUAL = {"mujoco": 1e-8, "drake": 1e-4, "pybullet": 1e-2, "dynx": 1e-8}
 """Residual of each engine's own equations of motion with contacts and constraints, in N and N m."""
 
 Q0 = (0.3, -1.2, 1.5, -0.3, 0.2, 0.0)

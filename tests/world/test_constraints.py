@@ -13,8 +13,8 @@ from dynx.world import PointToPoint, Scene, SceneRobot, Weld, World, box
 from dynx.world.scene.robots import LinkFrames
 from tests.world.engines import WORLDS
 
-pytestmark = pytest.mark.parametrize("engine", WORLDS)
-HELD_WITHIN = {"pybullet": 2e-3, "mujoco": 1e-3, "drake": 1e-4}
+pytestmark = pytest.mark.parametrize("engine", [*WORLDS, "dynx"])
+HELD_WITHIN = {"pybullet": 2e-3, "mujoco": 1e-3, "drake": 1e-4, "dynx": 1e-5}
 """Distance [m] from the pose or point at which a constraint to the world holds a body, by engine."""
 
 

@@ -1,108 +1,56 @@
 """`OwnStepper`: robots and bodies of a scene moved by dynx itself, over any backend.
 
 Each robot has a backend of its own, which computes its dynamics, and a body is a floating robot of one link.
-A step is that of `dynx.simulate`: `dynx.steppers.robot_step` and the stops of `dynx.steppers.joint_stops`.
-Nothing touches: a scene in which colliders may touch is for another engine.
+What nothing touches takes the step of `dynx.simulate`: `dynx.steppers.robot_step` and the stops of
+`dynx.steppers.joint_stops`. Contacts and constraints connect parts to islands
+(`dynx.engines.own.impulses`), whose impulses `dynx.rbd.constraints` solves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from math import hypot, isfinite
 from typing import Any, ClassVar
 
 import numpy as np
 
 from dynx._version import __version__
-from dynx.backends import backend
 from dynx.backends.registry import BUILT_IN as BACKENDS
-from dynx.backends.solvability import Solvability
-from dynx.model import Model
-from dynx.model.elements import Inertial, JointCoefficients, Link, Pose
+from dynx.engines.own.impulses import Island, TouchImpulse, WarmStart
+from dynx.engines.own.parts import OwnBody, OwnRobot, robot_of
+from dynx.engines.own.touching import ContactFinder, PossibleContact
+from dynx.errors import UnsupportedFeatureError, shown
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat
+from dynx.steppers.failures import translate_failures
 from dynx.steppers.forces import NO_FORCES, Forces
 from dynx.steppers.integrators import METHODS
-from dynx.steppers.joint_stops import MOVES_NO_FURTHER, JointStops
-from dynx.steppers.layout import BodyLayout, Layout, RobotLayout
-from dynx.steppers.robot_step import SCHEMES, RobotStep
+from dynx.steppers.joint_stops import MOVES_NO_FURTHER
+from dynx.steppers.layout import WORLD, Layout, Owner, RobotLayout
+from dynx.steppers.robot_step import SCHEMES
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
 from dynx.steppers.stepper import Feature, Stepper, TouchingPoint
 
+MAX_RESIDUAL = 1e-6
+"""Residual of the impulses [m/s or rad/s] above which a step counts as not solved."""
 
-class OwnRobot:
-    """A robot in motion: its state q (nq,), v (nv,), and what steps it."""
+TOUCHING = 1e-9
+"""Gap [m] up to which two surfaces touch, since poses are rounded."""
 
-    def __init__(
-        self,
-        model: Model,
-        joints: JointCoefficients,
-        h: float,
-        settings: Mapping[str, Any],
-        *,
-        limited: bool = False,
-    ) -> None:
-        """`limited`: joints stop at the position limits of the model."""
-        Solvability(model).refuse_singular(joint_dynamics=bool(joints.armature.any()))
-        self.engine = backend(settings["backend"], model, validate=False)
-        integrator = settings["integrator"]
-        names = ("method", "rtol", "atol") if integrator == "adaptive" else ()
-        options = {name: settings[name] for name in names}
-        self._step = RobotStep(self.engine, joints, h, integrator=integrator, **options)
-        mass_matrix, armature = self._step.dynamics.mass_matrix, np.diag(joints.armature)
-        self._stops = JointStops(model, lambda q: mass_matrix(q) + armature) if limited else None
-        self.q, self.v = model.neutral(), np.zeros(model.nv)
-        self._no_torque = np.zeros(model.nv)
+_singular_matrices = translate_failures(
+    (np.linalg.LinAlgError,), lambda _: "a mass matrix is singular or not finite"
+)
 
-    def step(self, tau: Floats | None) -> None:
-        """Take one step under a generalised force (nv,)."""
-        before = self.q
-        self.q, self.v, _ = self._step(before, self.v, self._no_torque if tau is None else tau)
-        stopped = None if self._stops is None else self._stops(before, self.q, self.v)
-        if stopped is not None:
-            self.q, self.v = stopped
-
-
-class OwnBody(OwnRobot):
-    """A body of the scene as a floating robot of one link."""
-
-    def __init__(self, body: BodyLayout, gravity: Floats, h: float, settings: Mapping[str, Any]) -> None:
-        (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = body.inertia.tolist()
-        x, y, z = body.center.tolist()
-        inertial = Inertial(body.mass, Pose((x, y, z)), ixx, ixy, ixz, iyy, iyz, izz)
-        model = Model.build(body.name, [Link("body", inertial)], [], base="floating", gravity=gravity)
-        nothing = np.zeros(model.nv)
-        super().__init__(model, JointCoefficients(nothing, nothing, nothing), h, settings)
-        self._center = body.center
-        self.set_state(body.T, body.twist)
-
-    def set_state(self, T: Floats, twist: Floats) -> None:
-        """Set the pose (4, 4) and twist (6,) of the body frame, in world axes."""
-        R = T[:3, :3]
-        self.q = np.concatenate([T[:3, 3], quat_from_rotation(R)])
-        self.v = np.concatenate([R.T @ twist[:3], R.T @ twist[3:]])
-
-    def state(self) -> BodyState:
-        """Return pose and twist of the body frame, in world axes."""
-        R = rotation_from_quat(self.q[3:])
-        twist = np.concatenate([R @ self.v[:3], R @ self.v[3:]])
-        return BodyState(homogeneous(R, self.q[:3]), twist)
-
-    def push(self, wrench: Floats) -> Floats:
-        """Return the generalised force (6,) of a force, and a moment about the centre of mass, in world
-        axes."""
-        R = rotation_from_quat(self.q[3:])
-        force = R.T @ wrench[:3]
-        return np.concatenate([force, R.T @ wrench[3:] + cross(self._center, force)])
-
+_WARM = struct.Struct("<5q8d")
+"""Format of a key and its impulses in a saved state."""
 
 _ADAPTIVE = ("integrator", ("adaptive",))
 
 
 class OwnStepper(Stepper):
-    """A scene without contacts, moved by the integrators of dynx."""
+    """A scene moved by the integrators of dynx; contacts and constraints need `semi_implicit`."""
 
     name: ClassVar[str] = "dynx"
     settings: ClassVar[Mapping[str, Setting]] = {
@@ -118,37 +66,160 @@ class OwnStepper(Stepper):
             1e-12, "absolute tolerance of the integrator `adaptive`", least=1e-300, needs=_ADAPTIVE
         ),
     }
-    contact_law: ClassVar[str] = "no contacts, and joint limits at which joints stop without a rebound"
+    contact_law: ClassVar[str] = (
+        "rigid contacts with circular cones of Coulomb friction and Poisson's restitution, and joint limits "
+        "at which joints stop without a rebound"
+    )
     beyond_limits: ClassVar[str] = MOVES_NO_FURTHER
 
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)
+        self.closed = False
         self._version = f"dynx {__version__}"
         self._robots: list[OwnRobot] = []
         self._bodies: dict[int, OwnBody] = {}
         try:
             for robot in layout.robots:
-                self._robots.append(_robot_of(robot, dt, settings))
+                self._robots.append(robot_of(robot, dt, settings))
             for k, body in enumerate(layout.bodies):
                 if not body.fixed:
                     self._bodies[k] = OwnBody(body, layout.gravity, dt, settings)
+            self._islands_of_constraints(settings)
         except BaseException:
             self.close()
             raise
 
+    def _islands_of_constraints(self, settings: Mapping[str, Any]) -> None:
+        """Prepare what touches and what is constrained.
+
+        Raises UnsupportedFeatureError for another integrator than semi-implicit Euler.
+        """
+        layout = self.layout
+        self._finder = ContactFinder(layout, self.dt) if layout.collides.any() else None
+        self._warm: WarmStart = {}
+        self._touches: list[TouchImpulse] | None = None
+        self._largest_residual, self._unsolved = 0.0, 0
+        self._moving = self._parts()
+        robots = len(self._robots)
+        self._part_of: dict[Owner, int] = {}
+        bodies = {body: robots + k for k, body in enumerate(self._bodies)}
+        owners = [] if self._finder is None else self._finder.owners
+        ends = [end.owner for each in layout.constraints for end in (each.a, each.b)]
+        self._owners = tuple(dict.fromkeys([*owners, *ends]))
+        for owner in self._owners:
+            if not layout.is_fixed(owner):
+                if owner.robot is not None:
+                    _refuse_limited_ball_joints(layout.robots[owner.robot])
+                self._part_of[owner] = bodies[owner.body] if owner.robot is None else owner.robot
+        self._has_islands = self._finder is not None or bool(layout.constraints)
+        integrator = settings["integrator"]
+        if self._has_islands and integrator != "semi_implicit":
+            what = "contacts" if self._finder is not None else "constraints"
+            raise UnsupportedFeatureError(
+                f"the scene {shown(layout.name)} has {what}, which the integrator {integrator} does not "
+                "have; wanted semi_implicit"
+            )
+
     @classmethod
     def provides(cls, layout: Layout) -> frozenset[Feature]:
-        return frozenset(Feature) - {Feature.CONTACTS, Feature.CONSTRAINTS}
+        return frozenset(Feature)
 
     # -- motion -------------------------------------------------------------------------------
 
+    @_singular_matrices
     def step(self, n: int, forces: Forces = NO_FORCES) -> None:
         torques = dict(forces.torques)
         for _ in range(n):
+            if self._has_islands:
+                self._step_islands(torques, forces.wrenches)
+                continue
             for k, robot in enumerate(self._robots):
                 robot.step(torques.get(k))
             for k, body in self._bodies.items():
                 body.step(None if forces.wrenches is None else body.push(forces.wrenches[k]))
+
+    def _step_islands(self, torques: Mapping[int, Floats], wrenches: Floats | None) -> None:
+        for k, robot in enumerate(self._robots):
+            robot.begin(torques.get(k))
+        for k, body in self._bodies.items():
+            body.begin(None if wrenches is None else body.push(wrenches[k]))
+        if not all(isfinite(sum(part.free.tolist())) for part in self._moving):
+            # The world notices that the motion has diverged.
+            for part in self._moving:
+                part.finish()
+            return
+        poses = self._poses()
+        jacobians = {owner: self._moving[k].jacobian(owner.body) for owner, k in self._part_of.items()}
+        contacts: Sequence[PossibleContact] = ()
+        if self._finder is not None:
+            speeds = dict.fromkeys(self._owners, (0.0, 0.0))
+            for owner, J in jacobians.items():
+                x, y, z, *omega = (J @ self._moving[self._part_of[owner]].free).tolist()
+                speeds[owner] = hypot(x, y, z), hypot(*omega)
+            contacts = self._finder.find(poses, speeds)
+        touches: list[TouchImpulse] = []
+        warm: WarmStart = {}
+        alone = set(range(len(self._moving)))
+        for island in self._islands(contacts, poses, jacobians):
+            alone -= island.parts.keys()
+            found, kept = island.step(self._warm)
+            touches += found
+            warm |= kept
+            if not island.residual <= MAX_RESIDUAL:
+                self._unsolved += 1
+                self._largest_residual = max(self._largest_residual, island.residual)
+        for k in sorted(alone):
+            self._moving[k].finish()
+        self._touches, self._warm = touches, warm
+
+    def _poses(self) -> dict[Owner, Floats]:
+        """Return the pose (4, 4) of each owner of shapes and ends of constraints."""
+        poses = {}
+        for owner in self._owners:
+            if owner in self._part_of:
+                poses[owner] = self._moving[self._part_of[owner]].pose(owner.body)
+            elif owner.robot is not None or owner.body == WORLD:
+                poses[owner] = np.eye(4)
+            else:
+                poses[owner] = self.layout.bodies[owner.body].T
+        return poses
+
+    def _islands(
+        self,
+        contacts: Sequence[PossibleContact],
+        poses: Mapping[Owner, Floats],
+        jacobians: Mapping[Owner, Floats],
+    ) -> Iterable[Island]:
+        """Return the islands of parts that contacts and constraints connect, in the order of their parts."""
+        leader = list(range(len(self._moving)))
+
+        def find(k: int) -> int:
+            while leader[k] != k:
+                k = leader[k]
+            return k
+
+        links: list[tuple[int, int | PossibleContact]] = []
+        ends: list[tuple[Owner, Owner, int | PossibleContact]] = [
+            (each.pair.owner_a, each.pair.owner_b, each) for each in contacts
+        ]
+        ends += [(each.a.owner, each.b.owner, k) for k, each in enumerate(self.layout.constraints)]
+        for a, b, what in ends:
+            numbers = [self._part_of[owner] for owner in (a, b) if owner in self._part_of]
+            if numbers:
+                links.append((numbers[0], what))
+                first, last = sorted((find(numbers[0]), find(numbers[-1])))
+                leader[last] = first
+        members: dict[int, list[int]] = {}
+        for k in range(len(leader)):
+            members.setdefault(find(k), []).append(k)
+        held: dict[int, list[int | PossibleContact]] = {}
+        for k, link in links:
+            held.setdefault(find(k), []).append(link)
+        for first in sorted(held):
+            touching = [each for each in held[first] if isinstance(each, PossibleContact)]
+            tied = {k: self.layout.constraints[k] for k in held[first] if isinstance(k, int)}
+            parts = {k: self._moving[k] for k in members[first]}
+            yield Island(self.dt, parts, self._part_of, touching, tied, poses, jacobians)
 
     # -- state --------------------------------------------------------------------------------
 
@@ -164,18 +235,29 @@ class OwnStepper(Stepper):
     def set_robot_state(self, robot: int, q: Floats, v: Floats) -> None:
         found = self._robots[robot]
         found.q, found.v = q.copy(), v.copy()
+        self._forget_contacts()
 
     def set_body_state(self, body: int, T: Floats, twist: Floats) -> None:
         self._bodies[body].set_state(T, twist)
+        self._forget_contacts()
+
+    def _forget_contacts(self) -> None:
+        self._touches, self._warm = None, {}
 
     def dump(self) -> bytes:
-        return b"".join(part.q.tobytes() + part.v.tobytes() for part in self._parts())
+        state = b"".join(part.q.tobytes() + part.v.tobytes() for part in self._parts())
+        warm = (_WARM.pack(*key, *values.tolist()) for key, values in self._warm.items())
+        return state + b"".join(warm)
 
     def load(self, data: bytes) -> None:
-        numbers = np.frombuffer(data)
+        size = 8 * sum(len(part.q) + len(part.v) for part in self._parts())
+        numbers = np.frombuffer(data[:size])
         for part in self._parts():
             q, v, numbers = np.split(numbers, np.cumsum([len(part.q), len(part.v)]))
             part.q, part.v = q.copy(), v.copy()
+        self._forget_contacts()
+        for kind, a, b, c, d, *values in _WARM.iter_unpack(data[size:]):
+            self._warm[kind, a, b, c, d] = np.array(values)
 
     def _parts(self) -> list[OwnRobot]:
         return [*self._robots, *self._bodies.values()]
@@ -183,7 +265,40 @@ class OwnStepper(Stepper):
     # -- queries ------------------------------------------------------------------------------
 
     def contacts(self) -> Sequence[TouchingPoint]:
-        return ()
+        if self._finder is None:
+            return ()
+        touches = self._touches
+        if touches is None:
+            for part in self._moving:
+                part.forget_placements()
+            found = self._finder.find(self._poses(), None)
+            touches = [TouchImpulse(each, 0.0, np.zeros(3)) for each in found]
+        points, h = [], self.dt
+        for contact, normal, friction in touches:
+            if normal > 0.0 or contact.gap <= TOUCHING:
+                pair = contact.pair
+                points.append(
+                    TouchingPoint(
+                        pair.collider_a,
+                        pair.collider_b,
+                        contact.point_a,
+                        contact.point_b,
+                        contact.normal,
+                        contact.gap,
+                        normal / h,
+                        friction / h,
+                    )
+                )
+        return points
+
+    def notes(self) -> Sequence[str]:
+        if not self._unsolved:
+            return ()
+        times = "once" if self._unsolved == 1 else f"{self._unsolved} times"
+        return (
+            f"impulses of contacts and constraints missed their conditions {times} by more than "
+            f"{MAX_RESIDUAL:g} m/s, at most by {self._largest_residual:.3g}",
+        )
 
     # -- end ----------------------------------------------------------------------------------
 
@@ -192,12 +307,17 @@ class OwnStepper(Stepper):
         return self._version
 
     def close(self) -> None:
+        self.closed = True
         for part in self._parts():
             part.engine.close()
 
 
-def _robot_of(robot: RobotLayout, h: float, settings: Mapping[str, Any]) -> OwnRobot:
-    limited = bool(np.isfinite([robot.lower, robot.upper]).any())
-    made = OwnRobot(robot.model, robot.coefficients(), h, settings, limited=limited)
-    made.q, made.v = robot.q.copy(), robot.v.copy()
-    return made
+def _refuse_limited_ball_joints(robot: RobotLayout) -> None:
+    """Raise UnsupportedFeatureError, naming the joint, for a limit that impulses of an island do not have."""
+    if robot.model.ball_joints and np.isfinite([robot.lower, robot.upper]).any():
+        ball = robot.model.ball_joints[0]
+        raise UnsupportedFeatureError(
+            f"the robot {shown(robot.name)} has joint limits and the ball joint {shown(ball.name)}, which "
+            "the engine 'dynx' does not have together with contacts and constraints; joint_limits=False "
+            "switches limits off"
+        )

@@ -1,0 +1,399 @@
+"""Impulses of contacts, constraints, joint limits and dry friction on parts that touch, in one step.
+
+An *island* is a set of robots and bodies that contacts and constraints connect; each has a problem of its own
+(`dynx.rbd.constraints`). A contact has a normal row, two tangents, and rows of torsional and rolling
+friction where its coefficients are above zero. All rows act at the middle of the two points, so that forces
+on both bodies are opposite.
+
+**Gaps.** A contact whose gap phi may close in the step has the normal velocity w >= -phi / h: bodies touch at
+the end of the step, not beyond. Where they overlap, w >= 0. A displacement without velocity takes back a part
+of each overlap and each error of a constraint (split impulses, as in Catto, Iterative dynamics with
+temporal coherence, 2005), so that errors of positions make no kinetic energy.
+
+**Impacts.** A contact with restitution that closes in the step meets at the fraction s of it, with the
+velocity that the free motion has then. Its coefficient of restitution is reduced to the ratio of this
+velocity to that of the end of the step: a body at rest has 0, needs no threshold, and remains at rest; one
+that bounces gains no energy from the gravity of the rest of the step. The impact acts on velocities; the
+displacement of the step ends where the gap closes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.engines.own.parts import OwnRobot
+from dynx.engines.own.touching import MARGIN, REACH, PossibleContact
+from dynx.rbd.constraints import ConstraintSets, Disk, Solution, rebound, solve
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import cross, quat_from_rotation, quat_log, skew
+from dynx.steppers.layout import ConstraintLayout, Owner
+
+CORRECTION = 0.2
+"""Part of an overlap that one step takes back; of an error of a constraint it takes back all."""
+
+MAX_CORRECTION_SPEED = 1.0
+"""Largest speed [m/s or rad/s] at which a step takes back an overlap or an error of a constraint."""
+
+NEGLIGIBLE = 1e-10
+"""Overlap and error of a constraint [m or rad] that count as none."""
+
+NEGLIGIBLE_REBOUND = 1e-9
+"""Speed after an impact [m/s] that counts as none."""
+
+STUCK = 1e-9
+"""Velocity [rad/s or m/s] of a joint that sticks by dry friction, which is rounding."""
+
+Key = tuple[int, int, int, int, int]
+"""What an impulse belongs to: its kind, then two shapes and their features, or part, joint and side, or
+number of the constraint, and zeros."""
+
+CONTACT, LIMIT, DRY, CONSTRAINT = range(4)
+"""Kinds of keys."""
+
+WarmStart = dict[Key, Floats]
+"""Impulses (8,) of the step before: of a contact the normal impulse, friction (3,), torsion and rolling
+moment (3,) in axes of the world; of others their rows, then zeros."""
+
+NO_ROWS = np.zeros(0)
+
+
+class TouchImpulse(NamedTuple):
+    """Impulses of one contact in a step, on its first body, in axes of the world."""
+
+    contact: PossibleContact
+    normal: float
+    """Along the normal [N s]."""
+    friction: Floats
+    """Perpendicular to it (3,) [N s]."""
+
+
+@lru_cache(maxsize=256)
+def _sets(kinds: tuple[tuple[bool, bool, bool], ...], limits: int, dry: int, free: int) -> ConstraintSets:
+    """Return the sets of contacts, with or without friction, torsional and rolling friction, and of further
+    rows."""
+    unilateral: list[int] = []
+    disks: list[Disk] = []
+    row = 0
+    for kind in kinds:
+        normal = row
+        unilateral.append(normal)
+        row += 1
+        for present, size in zip(kind, (2, 1, 2), strict=True):
+            if present:
+                disks.append(Disk(tuple(range(row, row + size)), normal))
+                row += size
+    unilateral += range(row, row + limits)
+    row += limits
+    disks += [Disk((k,)) for k in range(row, row + dry)]
+    row += dry
+    return ConstraintSets(row + free, tuple(unilateral), tuple(disks), tuple(range(row, row + free)))
+
+
+class Island:
+    """Parts that contacts and constraints connect, in one step of length `h` [s].
+
+    `parts` are robots and bodies by number, `part_of` the number of the part of each owner that moves;
+    `poses` (4, 4) and `jacobians` (6, nv) are those of the owners.
+    """
+
+    def __init__(
+        self,
+        h: float,
+        parts: Mapping[int, OwnRobot],
+        part_of: Mapping[Owner, int],
+        contacts: Sequence[PossibleContact],
+        constraints: Mapping[int, ConstraintLayout],
+        poses: Mapping[Owner, Floats],
+        jacobians: Mapping[Owner, Floats],
+    ) -> None:
+        self._h, self._part_of = h, part_of
+        self.parts = parts
+        self._pairs = [each.pair for each in contacts]
+        self._contacts, self._constraints = contacts, constraints
+        self._poses, self._jacobians = poses, jacobians
+        self._columns: dict[int, slice] = {}
+        first = 0
+        for number, part in parts.items():
+            self._columns[number] = slice(first, first + part.nv)
+            first += part.nv
+        self._nv = first
+        self.residual = 0.0
+        """Largest residual of the impulses [m/s or rad/s]."""
+
+    # -- rows ---------------------------------------------------------------------------------
+
+    def _contact_rows(self) -> tuple[Floats, Floats]:
+        """Return J (n, 6, nv) of the contacts: normal, two tangents, and rotation about each of these; and
+        these directions (n, 3, 3)."""
+        contacts = self._contacts
+        points = np.array([0.5 * (each.point_a + each.point_b) for each in contacts])
+        D = directions(np.array([each.normal for each in contacts]))
+        J = np.zeros((len(contacts), 6, self._nv))
+        sides: dict[Owner, list[tuple[int, float]]] = {}
+        for k, pair in enumerate(self._pairs):
+            sides.setdefault(pair.owner_a, []).append((k, 1.0))
+            sides.setdefault(pair.owner_b, []).append((k, -1.0))
+        for owner, chosen in sides.items():
+            if owner not in self._part_of:
+                continue
+            columns, rates = self._columns[self._part_of[owner]], self._jacobians[owner]
+            rows = [k for k, _ in chosen]
+            signs = np.array([sign for _, sign in chosen])[:, None, None]
+            axes = D[rows] * signs
+            levers = points[rows] - self._poses[owner][:3, 3]
+            J[rows, :3, columns] += axes @ rates[:3] + cross(levers[:, None, :], axes) @ rates[3:]
+            J[rows, 3:, columns] += axes @ rates[3:]
+        return J, D
+
+    def _limit_rows(self) -> tuple[list[tuple[int, int, int]], Floats]:
+        """Return part, coordinate and side (1 at the lower limit, -1 at the upper one) of each joint limit
+        that may be reached in the step, and its gap [rad or m]; 0 for a joint beyond it."""
+        rows: list[tuple[int, int, int]] = []
+        gaps: list[float] = []
+        for number, part in self.parts.items():
+            if part.limits is None:
+                continue
+            n = len(part.limits[0])
+            positions, base = part.q[len(part.q) - n :], part.nv - n
+            ways = REACH * self._h * (np.abs(part.free[base:]) + np.abs(part.v[base:])) + MARGIN
+            for side, limit in ((1, part.limits[0]), (-1, part.limits[1])):
+                gap = side * (positions - limit)
+                for joint in np.flatnonzero(gap <= ways).tolist():
+                    rows.append((number, base + joint, side))
+                    gaps.append(max(float(gap[joint]), 0.0))
+        return rows, np.array(gaps)
+
+    def _constraint_rows(self) -> tuple[Floats, Floats]:
+        """Return J (m, nv) and errors (m,) [m or rad] of welds and points: 6 and 3 rows in axes of the
+        world."""
+        blocks, errors = [np.zeros((0, self._nv))], [NO_ROWS]
+        for constraint in self._constraints.values():
+            size = 3 if constraint.kind == "point" else 6
+            block, ends = np.zeros((6, self._nv)), []
+            for anchor, sign in ((constraint.a, 1.0), (constraint.b, -1.0)):
+                T = self._poses[anchor.owner] @ anchor.T
+                ends.append(T)
+                if anchor.owner not in self._part_of:
+                    continue
+                columns, rates = self._columns[self._part_of[anchor.owner]], self._jacobians[anchor.owner]
+                lever = T[:3, 3] - self._poses[anchor.owner][:3, 3]
+                block[:3, columns] += sign * (rates[:3] - skew(lever) @ rates[3:])
+                block[3:, columns] += sign * rates[3:]
+            turned = quat_log(quat_from_rotation(ends[0][:3, :3] @ ends[1][:3, :3].T))
+            blocks.append(block[:size])
+            errors.append(np.concatenate([ends[0][:3, 3] - ends[1][:3, 3], turned])[:size])
+        return np.concatenate(blocks), np.concatenate(errors)
+
+    def _velocity(self, of: str) -> Floats:
+        """Return the velocities of all parts (nv,): `free` or `v`."""
+        return np.concatenate([getattr(part, of) for part in self.parts.values()])
+
+    # -- the step -----------------------------------------------------------------------------
+
+    def step(self, warm: WarmStart) -> tuple[list[TouchImpulse], WarmStart]:
+        """Take the step of the parts; return the impulses of the contacts, and those for the next step.
+
+        Where no contact closes and nothing is constrained, each part completes its free motion.
+        """
+        h, n = self._h, len(self._contacts)
+        rows, D = self._contact_rows() if n else (np.zeros((0, 6, self._nv)), np.zeros((0, 3, 3)))
+        gaps = np.array([each.gap for each in self._contacts])
+        free = self._velocity("free")
+        closes = bool((rows[:, 0] @ free < -np.maximum(gaps, 0.0) / h).any())
+        if not closes and not self._constraints:
+            for part in self.parts.values():
+                part.finish()
+            return [], {}
+        for part in self.parts.values():
+            part.release_dry_friction()
+        free = self._velocity("free")
+        present = np.array([_present(pair.friction) for pair in self._pairs], dtype=np.bool_).reshape(n, 6)
+        limits, limit_gaps = self._limit_rows()
+        dry = [(k, j) for k, part in self.parts.items() for j in part.dry_joints.tolist()]
+        bilateral, errors = self._constraint_rows()
+        units = np.zeros((len(limits) + len(dry), self._nv))
+        for row, (number, joint, side) in enumerate(limits):
+            units[row, self._columns[number].start + joint] = side
+        for row, (number, joint) in enumerate(dry, len(limits)):
+            units[row, self._columns[number].start + joint] = 1.0
+        J = np.concatenate([rows[present], units, bilateral])
+        kinds = tuple((bool(row[1]), bool(row[3]), bool(row[4])) for row in present)
+        sets = _sets(kinds, len(limits), len(dry), len(bilateral))
+        X = np.concatenate(
+            [part.response(J[:, self._columns[number]]) for number, part in self.parts.items()]
+        )
+        G = J @ X
+        G = 0.5 * (G + G.T)
+        radii = [
+            coefficient for pair in self._pairs for coefficient in pair.friction if coefficient > 0.0
+        ] + [h * float(self.parts[number].dry[joint]) for number, joint in dry]
+        numbers = np.array(radii)
+        keys = self._keys(limits, dry)
+        start = self._start(warm, keys, present, D, len(J))
+        normals = np.array(sets.unilateral[:n], dtype=np.intp)
+        opening = np.zeros(len(J))
+        opening[list(sets.unilateral)] = np.concatenate([np.maximum(gaps, 0.0), limit_gaps]) / h
+        c = J @ free
+        first = solve(sets, G, c + opening, numbers, start=start)
+        last = self._impacts(sets, G, c, opening, numbers, first, normals, J)
+        self.residual = float(max(first.residuals.largest, last.residuals.largest))
+        u = free + X @ first.impulses
+        w = u if last is first else free + X @ last.impulses
+        correction = self._correction(sets, G, first.velocities - opening, gaps, limit_gaps, errors, normals)
+        displaced = u if correction is None else u + X @ correction
+        for number, part in self.parts.items():
+            columns = self._columns[number]
+            part.finish_at(displaced[columns], self._at_rest(number, w[columns], dry, sets, last, numbers))
+        return self._results(last.impulses, keys, present, D)
+
+    def _impacts(
+        self,
+        sets: ConstraintSets,
+        G: Floats,
+        c: Floats,
+        opening: Floats,
+        radii: Floats,
+        first: Solution,
+        normals: NDArray[np.intp],
+        J: Floats,
+    ) -> Solution:
+        """Return the impulses that determine the velocities at the end: those of `first` without impacts
+        that rebound."""
+        if not any(pair.restitution > 0.0 for pair in self._pairs):
+            return first
+        free, begin = c[normals], J[normals] @ self._velocity("v")
+        e = np.array([pair.restitution for pair in self._pairs])
+        hits = (first.impulses[normals] > 0.0) & (free < 0.0)
+        approach = np.where(hits, free, -1.0)
+        moment = np.minimum(-opening[normals] / approach, 1.0)
+        share = np.clip((begin + moment * (free - begin)) / approach, 0.0, 1.0)
+        e = np.where(hits, e * share, 0.0)
+        if not (e * np.abs(approach) > NEGLIGIBLE_REBOUND).any():
+            return first
+        # The impact happens where the gaps are closed.
+        closed = opening.copy()
+        closed[normals[hits]] = 0.0
+        plastic = solve(sets, G, c + closed, radii, start=first.impulses)
+        restitution = np.zeros(sets.size)
+        restitution[normals] = e
+        return rebound(sets, G, c + closed, radii, plastic, restitution)
+
+    def _correction(
+        self,
+        sets: ConstraintSets,
+        G: Floats,
+        velocities: Floats,
+        gaps: Floats,
+        limit_gaps: Floats,
+        errors: Floats,
+        normals: NDArray[np.intp],
+    ) -> Floats | None:
+        """Return the impulses (m,) of the displacement that takes back a part of overlaps and errors of
+        constraints; None where there are none."""
+        h = self._h
+        overlaps = bool((gaps < -NEGLIGIBLE).any())
+        if not overlaps and not (np.abs(errors) > NEGLIGIBLE).any():
+            return None
+        wanted = np.zeros(sets.size)
+        after = gaps / h + velocities[normals]
+        back = np.maximum(CORRECTION * gaps / h, -MAX_CORRECTION_SPEED)
+        wanted[normals] = np.where(gaps < 0.0, back + np.maximum(velocities[normals], 0.0), after)
+        rows = list(sets.unilateral[len(normals) :])
+        wanted[rows] = np.maximum(limit_gaps / h + velocities[rows], 0.0)
+        wanted[list(sets.free)] = np.clip(errors / h, -MAX_CORRECTION_SPEED, MAX_CORRECTION_SPEED)
+        return solve(sets, G, wanted, np.zeros(len(sets.disks))).impulses
+
+    def _at_rest(
+        self,
+        number: int,
+        w: Floats,
+        dry: Sequence[tuple[int, int]],
+        sets: ConstraintSets,
+        found: Solution,
+        radii: Floats,
+    ) -> Floats:
+        """Return the velocity of a part, in which joints that stick by dry friction have none."""
+        held = [
+            joint
+            for (part, joint), disk, radius in zip(
+                dry, sets.disks[len(sets.disks) - len(dry) :], radii[len(radii) - len(dry) :], strict=True
+            )
+            if part == number and abs(found.impulses[disk.rows[0]]) < radius and abs(w[joint]) < STUCK
+        ]
+        if held:
+            w = w.copy()
+            w[held] = 0.0
+        return w
+
+    # -- warm start ---------------------------------------------------------------------------
+
+    def _keys(self, limits: Sequence[tuple[int, int, int]], dry: Sequence[tuple[int, int]]) -> list[Key]:
+        keys: list[Key] = [(CONTACT, each.pair.a, each.pair.b, *each.feature) for each in self._contacts]
+        keys += [(LIMIT, *each, 0) for each in limits]
+        keys += [(DRY, *each, 0, 0) for each in dry]
+        return keys + [(CONSTRAINT, number, 0, 0, 0) for number in self._constraints]
+
+    def _start(
+        self, warm: WarmStart, keys: Sequence[Key], present: NDArray[np.bool_], D: Floats, size: int
+    ) -> Floats:
+        """Return the impulses (m,) of the step before, zero where there is none."""
+        n, values = len(D), np.zeros((len(keys), 8))
+        for k, key in enumerate(keys):
+            if key in warm:
+                values[k] = warm[key]
+        of_contacts = np.zeros((n, 6))
+        of_contacts[:, 0], of_contacts[:, 3] = values[:n, 0], values[:n, 4]
+        of_contacts[:, 1:3] = np.einsum("kij,kj->ki", D[:, 1:], values[:n, 1:4])
+        of_contacts[:, 4:6] = np.einsum("kij,kj->ki", D[:, 1:], values[:n, 5:8])
+        single = len(keys) - len(self._constraints)
+        others = [values[k, : self._rows_of(number)] for k, number in enumerate(self._constraints, single)]
+        start = np.concatenate([of_contacts[present], values[n:single, 0], *others])
+        assert len(start) == size
+        return start
+
+    def _rows_of(self, constraint: int) -> int:
+        return 3 if self._constraints[constraint].kind == "point" else 6
+
+    def _results(
+        self, impulses: Floats, keys: Sequence[Key], present: NDArray[np.bool_], D: Floats
+    ) -> tuple[list[TouchImpulse], WarmStart]:
+        n, taken = len(D), int(present.sum())
+        values = np.zeros((len(keys), 8))
+        of_contacts = np.zeros((n, 6))
+        of_contacts[present] = impulses[:taken]
+        values[:n, 0], values[:n, 4] = of_contacts[:, 0], of_contacts[:, 3]
+        values[:n, 1:4] = np.einsum("kij,ki->kj", D[:, 1:], of_contacts[:, 1:3])
+        values[:n, 5:8] = np.einsum("kij,ki->kj", D[:, 1:], of_contacts[:, 4:6])
+        single = len(keys) - len(self._constraints)
+        values[n:single, 0] = impulses[taken : taken + single - n]
+        row = taken + single - n
+        for k, number in enumerate(self._constraints, single):
+            size = self._rows_of(number)
+            values[k, :size] = impulses[row : row + size]
+            row += size
+        touches = [
+            TouchImpulse(contact, float(values[k, 0]), values[k, 1:4])
+            for k, contact in enumerate(self._contacts)
+        ]
+        return touches, dict(zip(keys, values, strict=True))
+
+
+def _present(friction: tuple[float, float, float]) -> list[bool]:
+    """Return which rows a contact has: normal, two tangents, rotation about the normal and the tangents."""
+    sliding, torsion, rolling = (each > 0.0 for each in friction)
+    return [True, sliding, sliding, torsion, rolling, rolling]
+
+
+def directions(normals: Floats) -> Floats:
+    """Return unit vectors (n, 3, 3): each normal, and two tangents that complete it."""
+    axes = np.zeros_like(normals)
+    across = np.abs(normals[:, 0]) > 0.6
+    axes[:, 0], axes[:, 1] = ~across, across
+    first = cross(normals, axes)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([normals, first, cross(normals, first)], axis=1)

@@ -1,0 +1,246 @@
+"""Contacts and constraints of dynx's own stepper: closed forms, laws of mechanics, saved worlds, refusals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.engines.own.stepper import MAX_RESIDUAL, OwnStepper
+from dynx.errors import UnsupportedFeatureError
+from dynx.model.geometry import Collision, HeightField
+from dynx.rbd.constraints import ConstraintSets, Residuals, Solution
+from dynx.spatial.scalar import Floats
+from dynx.world import (
+    Material,
+    PDMotor,
+    Scene,
+    SceneBody,
+    SceneRobot,
+    World,
+    box,
+    ground,
+    sphere,
+)
+
+G = 9.81
+
+
+def cubes(masses: Sequence[float], material: Material | None = None) -> list[SceneBody]:
+    """Return cubes of 0.2 m on one another."""
+    made = Material() if material is None else material
+    return [
+        box(f"cube {k}", (0.2, 0.2, 0.2), mass=mass, pose=dynx.Pose((0, 0, 0.1 + 0.2 * k)), material=made)
+        for k, mass in enumerate(masses)
+    ]
+
+
+def on_slope(angle: float, friction: float) -> Scene:
+    """Return a cube at rest on level ground, with gravity as on a slope [rad]."""
+    gravity = (G * math.sin(angle), 0.0, -G * math.cos(angle))
+    material = Material(friction=friction)
+    return Scene("slope", bodies=(ground(material=material), *cubes([2.0], material)), gravity=gravity)
+
+
+@pytest.mark.parametrize("masses", [[1.0] * 5, [1.0, 1000.0], [1000.0, 1.0]], ids=str)
+def test_stacks_stand_still_on_the_sum_of_their_weights(masses: list[float]) -> None:
+    with World(Scene("stack", bodies=(ground(), *cubes(masses))), "dynx", 2e-3) as world:
+        world.step(200)
+        state, forces = world.state, world.contacts("ground")
+        assert not world.notes
+    for k in range(len(masses)):
+        assert state.bodies[f"cube {k}"].position == pytest.approx([0, 0, 0.1 + 0.2 * k], abs=1e-9)
+        assert np.abs(state.bodies[f"cube {k}"].twist).max() < 1e-9
+    weight = -sum(contact.force[2] for contact in forces)
+    assert weight == pytest.approx(G * sum(masses), rel=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.99])
+def test_a_cube_on_a_slope_within_the_cone_does_not_creep(share: float) -> None:
+    with World(on_slope(math.atan(0.5 * share), 0.5), "dynx", 1e-3) as world:
+        world.step(300)
+        assert np.abs(world.state.bodies["cube 0"].twist).max() < 1e-10
+        assert np.abs(world.state.bodies["cube 0"].position[:2]).max() < 1e-10
+
+
+@pytest.mark.parametrize("heading", [0.3, 2.0])
+def test_a_sliding_plate_stops_where_coulombs_law_has_it(heading: float) -> None:
+    speed, friction, h = 2.0, 0.4, 1e-3
+    twist = (speed * math.cos(heading), speed * math.sin(heading), 0.0, 0.0, 0.0, 0.0)
+    rough = Material(friction=friction)
+    plate = box("plate", (0.4, 0.3, 0.1), mass=3.0, pose=dynx.Pose((0, 0, 0.05)), twist=twist, material=rough)
+    with World(Scene("slide", bodies=(ground(material=rough), plate)), "dynx", h) as world:
+        world.step(600)
+        x, y, z = world.state.bodies["plate"].position
+        assert np.abs(world.state.bodies["plate"].twist).max() < 1e-9
+    assert math.hypot(x, y) == pytest.approx(speed**2 / (2 * friction * G) - speed * h / 2, rel=1e-4)
+    assert math.atan2(y, x) == pytest.approx(heading if heading < 3 else heading - 2 * math.pi, abs=1e-8)
+    assert z == pytest.approx(0.05, abs=1e-9)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_a_ball_meets_the_wall_and_another_ball_by_newtons_law(restitution: float) -> None:
+    made = Material(friction=0.0, restitution=restitution)
+    left = sphere("left", 0.1, mass=1.0, twist=(2.0, 0, 0, 0, 0, 0), material=made)
+    right = sphere("right", 0.1, mass=3.0, pose=dynx.Pose((0.3005, 0, 0)), material=made)
+    with World(Scene("impact", bodies=(left, right), gravity=(0, 0, 0)), "dynx", 1e-3) as world:
+        world.step(100)
+        v = [world.state.bodies[name].twist[0] for name in ("left", "right")]
+    assert v[1] - v[0] == pytest.approx(2.0 * restitution, abs=1e-9)
+    assert v[0] + 3.0 * v[1] == pytest.approx(2.0, abs=1e-12)
+
+
+def test_a_ball_that_bounces_gains_no_energy_and_comes_to_rest() -> None:
+    made = Material(restitution=0.8)
+    ball = sphere("ball", 0.1, mass=1.0, pose=dynx.Pose((0, 0, 0.5)), material=made)
+    h, tops = 1e-3, [0.4]
+    with World(Scene("bounce", bodies=(ground(material=made), ball)), "dynx", h) as world:
+        rises = False
+        for _ in range(3500):
+            world.step()
+            state = world.state.bodies["ball"]
+            assert state.position[2] > 0.1 - 1e-9
+            if rises and state.twist[2] <= 0.0:
+                tops.append(state.position[2] - 0.1)
+            rises = state.twist[2] > 0.0
+        assert np.abs(state.twist).max() < 1e-9
+    ratios = np.array(tops[1:5]) / tops[:4]
+    assert (ratios <= 0.64 + 1e-12).all()
+    # A step of gravity at the speed of the impact is the error of the integrator.
+    assert ratios == pytest.approx(0.64, abs=4 * h * math.sqrt(2 * G / min(tops[:5])))
+
+
+def test_bodies_in_the_air_move_with_the_bits_of_a_world_without_contacts() -> None:
+    high = dynx.Pose((0, 0, 5.0), (0.1, 0.2, 0.3))
+    brick = box("brick", (0.1, 0.2, 0.3), mass=1.0, pose=high, twist=(1, 0, 0, 3, 2, 1))
+    pendulum = SceneRobot("arm", dynx.load("panda"))
+    scene = Scene("air", bodies=(ground(pose=dynx.Pose((0, 0, -2))), brick), robots=(pendulum,))
+    states = []
+    for collisions in (True, False):
+        with World(scene, "dynx", 1e-3, collisions=collisions) as world:
+            world.step(30)
+            states.append(world.state)
+    for name in ("q", "v"):
+        ours, theirs = (getattr(state.robots["arm"], name) for state in states)
+        assert ours.tobytes() == theirs.tobytes()
+    assert states[0].bodies["brick"].twist.tobytes() == states[1].bodies["brick"].twist.tobytes()
+    assert (
+        states[0].bodies["brick"].T_world_body.tobytes() == states[1].bodies["brick"].T_world_body.tobytes()
+    )
+
+
+def tumbling() -> Scene:
+    """Return bodies that fall on the ground and on one another, and slide."""
+    made = Material(friction=0.4, torsional_friction=0.01, rolling_friction=0.002, restitution=0.3)
+    bodies = [
+        replace(each, twist=(1.0, 0.5 * k, 0.0, 1.0, 2.0, 3.0))
+        for k, each in enumerate(cubes([1.0, 2.0, 0.5], made))
+    ]
+    ball = sphere("ball", 0.1, mass=1.0, pose=dynx.Pose((0.3, 0.1, 0.3)), material=made)
+    return Scene("tumble", bodies=(ground(material=made), *bodies, ball))
+
+
+def test_a_written_world_continues_bit_for_bit_with_its_warm_start(tmp_path: Path) -> None:
+    with World(tumbling(), "dynx", 2e-3) as world:
+        world.step(40)
+        world.write(tmp_path / "tumble.world")
+        snapshot = world.save()
+        world.step(20)
+        expected = world.state
+        world.restore(snapshot)
+        world.step(20)
+        assert world.state == expected
+    with World.read(tmp_path / "tumble.world") as again:
+        again.step(20)
+        assert again.state == expected
+
+
+def test_contacts_keep_momentum_and_take_energy() -> None:
+    scene = replace(tumbling(), gravity=(0.0, 0.0, 0.0))
+    scene = replace(scene, bodies=scene.bodies[1:])
+    with World(scene, "dynx", 1e-3) as world:
+        before = _momentum_and_energy(scene, world)
+        energies = [before[1]]
+        for _ in range(10):
+            world.step(20)
+            momentum, energy = _momentum_and_energy(scene, world)
+            assert momentum == pytest.approx(before[0], abs=1e-10)
+            energies.append(energy)
+    assert (np.diff(energies) <= 1e-9).all()
+    assert energies[-1] < 0.9 * energies[0]
+
+
+def _momentum_and_energy(scene: Scene, world: World) -> tuple[Floats, float]:
+    momentum, energy = np.zeros(3), 0.0
+    for body in scene.bodies:
+        T, twist = world.state.bodies[body.name]
+        inertia = T[:3, :3] @ np.array(body.inertial.tensor) @ T[:3, :3].T
+        momentum += body.inertial.mass * twist[:3]
+        energy += 0.5 * body.inertial.mass * twist[:3] @ twist[:3] + 0.5 * twist[3:] @ inertia @ twist[3:]
+    return momentum, float(energy)
+
+
+def test_a_robot_stands_on_its_feet_with_joint_friction_and_limits() -> None:
+    dog = dynx.load("a1", base="floating")
+    q = np.array([0, 0, 0.32, 0, 0, 0, 1, *[0.0, 0.8, -1.6] * 4])
+    scene = Scene("stand", robots=(SceneRobot("dog", dog, q=tuple(q)),), bodies=(ground(),))
+    stand = PDMotor(q[7:], kp=100.0, kd=2.0, max_force=30.0)
+    with World(scene, "dynx", 1e-3) as world:
+        world.run(1.0, motors={"dog": stand})
+        feet = world.contacts("dog")
+        assert len(feet) == 4
+        assert sum(each.force[2] for each in feet) == pytest.approx(G * dog.total_mass, rel=2e-2)
+        assert not world.notes
+
+
+def test_a_joint_in_contact_stops_at_its_limit_and_sticks_by_dry_friction() -> None:
+    """A slider that a ball pushes: its dry friction holds it, or it moves to its limit."""
+    text = """<robot name="slider"><link name="base"/><link name="block">
+      <inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+      <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+      <joint name="slide" type="prismatic"><parent link="base"/><child link="block"/><axis xyz="1 0 0"/>
+      <limit lower="-0.1" upper="0.05" effort="1" velocity="1"/><dynamics friction="{friction}"/></joint>
+      </robot>"""
+    for friction, held in ((70.0, True), (10.0, False)):
+        robot = SceneRobot("slider", dynx.load(text.format(friction=friction)))
+        ball = sphere("ball", 0.1, mass=1.0, pose=dynx.Pose((-0.2, 0, 0)))
+        with World(
+            Scene("push", robots=(robot,), bodies=(ball,), gravity=(30.0, 0, 0)), "dynx", 1e-3
+        ) as world:
+            world.step(200)
+            q, v = world.state.robots["slider"]
+            x = world.state.bodies["ball"].position[0]
+        assert v[0] == pytest.approx(0.0, abs=1e-12)
+        assert q[0] == pytest.approx(0.0 if held else 0.05, abs=1e-12)
+        assert x == pytest.approx(q[0] - 0.2, abs=1e-9)
+
+
+def test_impulses_that_miss_their_conditions_are_noted(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unsolved(sets: ConstraintSets, G: Floats, c: Floats, *_: object, **__: object) -> Solution:
+        residuals = Residuals(2.0 * MAX_RESIDUAL, 0.0, 0.0, 0.0, 0.0)
+        return Solution(np.zeros(sets.size), c, residuals, 0)
+
+    with World(Scene("one", bodies=(ground(), *cubes([1.0]))), "dynx", 1e-3) as world:
+        world.step()
+        assert not world.notes
+        monkeypatch.setattr("dynx.engines.own.impulses.solve", unsolved)
+        world.step(3)
+        assert "3 times by more than 1e-06 m/s, at most by 2e-06" in world.notes[-1]
+
+
+def test_height_fields_are_refused_by_name() -> None:
+    field = HeightField(((0.0, 0.0), (0.0, 0.0)), (1.0, 1.0))
+    scene = Scene("hills", bodies=(SceneBody("hill", (Collision(field),)), *cubes([1.0])))
+    with pytest.raises(UnsupportedFeatureError, match="'hill' of the scene 'hills' is a height field"):
+        World(scene, "dynx")
+
+
+def test_materials_are_those_of_the_scene() -> None:
+    with World(tumbling(), "dynx", 1e-3) as world:
+        assert not world.inexact_materials()
+    assert OwnStepper.name == "dynx"
