@@ -59,7 +59,7 @@ LONGEST = (
 """Beginnings of the names of tests that take up to a minute each, or wait for a browser."""
 
 
-CASES, LONG_CASES = 5, 2
+CASES, LONG_CASES = 4, 2
 """Largest number of cases of one test that run without ``--whole``, and of one with the mark ``long_cases``:
 each takes a good part of a second or more, and repeats the others on another robot, engine or kind."""
 

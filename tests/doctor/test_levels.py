@@ -89,7 +89,7 @@ def check_changes(report: DoctorReport, text: str, trial: Trial, level: Level) -
 
 
 @needs_all_engines
-@settings(max_examples=min(PROFILE, max(14, PROFILE // 4)))
+@settings(max_examples=min(PROFILE, max(8, PROFILE // 4)))
 @given(st.data())
 def test_changes_are_named_keep_to_their_level_and_are_all_done_at_the_highest(data: st.DataObject) -> None:
     trial = data.draw(st.sampled_from(trials()))

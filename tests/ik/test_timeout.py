@@ -126,11 +126,11 @@ def test_targets_of_a_batch_that_are_reached_in_time_have_the_result_that_they_h
         assert ample.timed_out is None
 
 
-def blocked(frame: str) -> tuple[Scene, dynx.Model]:
-    """Return a scene in which a box stands where a frame is to go."""
+def blocked(frame: str, size: float = 0.3) -> tuple[Scene, dynx.Model]:
+    """Return a scene in which a box of a size [m] stands where a frame is to go."""
     model = dynx.load("panda")
     T = dynx.backend("reference", model).forward_kinematics(model.clip(model.neutral()), frame)
-    obstacle = box("obstacle", (0.3, 0.3, 0.3), pose=dynx.model.Pose(tuple(T[:3, 3])))
+    obstacle = box("obstacle", (size, size, size), pose=dynx.model.Pose(tuple(T[:3, 3])))
     return Scene("blocked", robots=[SceneRobot("arm", model)], bodies=[obstacle]), model
 
 
@@ -194,7 +194,7 @@ def test_a_search_that_avoids_begins_no_pair_of_bodies_after_its_time(
 def test_preparing_a_scene_takes_no_time_from_a_search(
     clock: Clock, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    scene, model = blocked("panda_hand")
+    scene, model = blocked("panda_hand", 0.1)
     prepare = Scene.avoidance_for
 
     def slow(*args: Any, **options: Any) -> Any:
@@ -205,7 +205,9 @@ def test_preparing_a_scene_takes_no_time_from_a_search(
     q = model.clip(model.neutral())
     with dynx.backend(name, model) as engine:
         T = engine.forward_kinematics(q, "panda_hand")
-        found = engine.inverse_kinematics(T[:3, 3], "panda_hand", q, avoid=scene, timeout=50.0)
+        found = engine.inverse_kinematics(
+            T[:3, 3], "panda_hand", q, avoid=scene, max_restarts=5, timeout=50.0
+        )
         assert not found.timed_out
         path = engine.track(np.stack([T] * 3), "panda_hand", q, avoid=scene, timeout=50.0)
         assert (path.status != TrackStatus.TIMED_OUT).all()

@@ -54,11 +54,11 @@ def last_copy_is_placed(page: Any, viewer: Viewer) -> bool:
     return all(row[0] == count for row in found) and np.allclose(T, wanted, atol=1e-5)
 
 
-@pytest.mark.parametrize("name", ["ur5", "a1"])
-def test_100_robots_are_drawn_with_the_calls_of_one_and_moved_by_one_message(
-    open_page: OpenPage, name: str
+@pytest.mark.parametrize(("name", "count"), [("ur5", 100), ("a1", 30)])
+def test_robots_are_drawn_with_the_calls_of_one_and_moved_by_one_message(
+    open_page: OpenPage, name: str, count: int
 ) -> None:
-    model, q = configurations(name, 100)
+    model, q = configurations(name, count)
     with dynx.viewer.view(model, q=q, spacing=1.5, whole_meshes=False) as viewer:
         shapes = {node.name for nodes in viewer.view.visuals.values() for node in nodes}
         with dynx.viewer.view(model, whole_meshes=False) as single:
@@ -66,7 +66,7 @@ def test_100_robots_are_drawn_with_the_calls_of_one_and_moved_by_one_message(
         opened = open_page(viewer.url, (600, 200))
         until(lambda: last_copy_is_placed(opened.page, viewer), "the copies")
         before = messages(viewer)
-        viewer.update(configurations(name, 100, 1)[1])
+        viewer.update(configurations(name, count, 1)[1])
         assert messages(viewer) == before + 1
         until(lambda: last_copy_is_placed(opened.page, viewer), "the copies of the next configurations")
         # The ground and the background are two more.

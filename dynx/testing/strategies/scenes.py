@@ -386,7 +386,10 @@ def _with_constraints(draw: st.DrawFn, scene: Scene) -> Scene:
         return scene
     made: list[Weld | PointToPoint] = []
     for a in draw(optional(st.lists(st.sampled_from(free), min_size=1, max_size=2, unique=True))) or []:
-        b = draw(st.sampled_from([end for end in ends if end != a and end not in {c.a for c in made}]))
+        others = [end for end in ends if end != a and end not in {c.a for c in made}]
+        links = [end for end in others if "/" in end]
+        # Few scenes have both robots and constraints: half of the constraints of these are to a link.
+        b = draw(st.sampled_from(links if links and draw(st.booleans()) else others))
         if draw(st.booleans()):
             made.append(Weld(a, b))
             continue
