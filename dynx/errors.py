@@ -304,7 +304,7 @@ class SimulationError(DynxError, RuntimeError):
 class DivergedError(SimulationError, ArithmeticError):
     """The state is no longer finite, or too fast to be meaningful.
 
-    `overshoot` is the joint whose damping is too large for the control step, as the message states it (a
+    `overshoot` is the joint whose damping gain is too large for the control step, which the message names (a
     `dynx.sim.overshoot.Overshoot`; None if there is none, and after unpickling).
     """
 

@@ -40,8 +40,8 @@ class JointFriction:
 
     With `slip` 0 it is d v + f sign(v), as with ``joint_dynamics=True`` in every backend. A joint at rest
     then has the torque between -f and f that keeps it at rest. This torque is no function of the velocity, so
-    plants solve for it (`dynx.rbd.joint_friction`). A mimic joint's coefficients act on its driver through
-    its multiplier.
+    plants solve for it (`dynx.rbd.joint_friction`). A mimic joint's coefficients act on its independent joint
+    through its multiplier.
     """
 
     model: Model

@@ -76,7 +76,7 @@ class Derivatives:
     translation and a rotation in the axes of the base; for joints these are ordinary partial derivatives. The
     unit is the unit of f divided by the unit of the variable.
 
-    Damping, friction, armature and external forces are not included.
+    Damping, friction, armature, springs and external forces are not included.
 
     A batch is split over at most `threads` threads; None stands for one per processor. Kernels are compiled
     when they are first needed and kept in the cache of `dynx.simd.cache`. Several threads may share an

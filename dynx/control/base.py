@@ -202,7 +202,7 @@ class ModelBased(Controller[ControllerState]):
     dynamics: Dynamics = field(init=False, repr=False)
     joint_dynamics: bool = field(default=False, kw_only=True, repr=False)
     joints: JointCoefficients | None = field(init=False, repr=False, compare=False, default=None)
-    """Coefficients (nv,) of the coordinates that the controller knows, if any is not 0."""
+    """Coefficients (nv,) of the joint dynamics that the controller includes; None if all are 0."""
 
     @checks_types
     def __init__(
@@ -356,8 +356,9 @@ def engine_of(model: Model, engine: str | Backend) -> Backend:
 def model_dynamics(model: Model, backend: str | Backend = "pinocchio") -> Dynamics:
     """Return the dynamics of `model`, for a controller of your own that evaluates them in `torque`.
 
-    As an attribute of the controller it is evaluated by the backend, of that name or for an equal model, and
-    in compiled steps and batches by compiled code. Raises ArgumentError for a backend of another robot.
+    `backend` is a name, or a backend of an equal model. Make the result an attribute of the controller. The
+    backend evaluates it, and compiled code does so in compiled steps and batches. Raises ArgumentError for a
+    backend of another robot.
     """
     return EngineDynamics(engine_of(model, backend))
 

@@ -92,7 +92,7 @@ class BulletPositionMotor(BulletMotor):
         velocity_gain: ArrayLike = 1.0,
         force: ArrayLike | None = None,
     ) -> None:
-        """`force` [N m or N] is the most a motor gives; the engine's default if None."""
+        """`force` [N m or N] is the largest force of a motor; None is the engine's default."""
         super().__init__(model)
         self._set(
             position_gain=self._per_joint("position_gain", position_gain),
@@ -120,7 +120,7 @@ class BulletVelocityMotor(BulletMotor):
     force: Floats | None = parameter("N m or N")
 
     def __init__(self, model: Model, *, force: ArrayLike | None = None) -> None:
-        """`force` [N m or N] is the most a motor gives; the engine's default if None."""
+        """`force` [N m or N] is the largest force of a motor; None is the engine's default."""
         super().__init__(model)
         self._set(force=self._limits(force))
 

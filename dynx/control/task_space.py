@@ -85,10 +85,9 @@ class Impedance(TaskSpace[None], pure=True):
         joint_dynamics: bool = False,
         backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
-        """`stiffness` K [N/m, N m/rad] and `damping` D [N s/m, N m s/rad] along the world's axes.
-
-        (6,), linear then angular, or one number; `joint_damping` B (nv,) damps motions that do not move the
-        frame. Raises GainError, UnknownNameError for the frame.
+        """`stiffness` K [N/m, N m/rad] and `damping` D [N s/m, N m s/rad] along the world's axes are (6,),
+        linear then angular, or one number; `joint_damping` B (nv,) damps motions that do not move the frame.
+        Raises GainError, UnknownNameError for the frame.
         """
         super().__init__(model, frame, backend, joint_dynamics)
         per = "linear then angular"

@@ -46,8 +46,8 @@ class IKResult:
     restarts: NDArray[np.int64]
     """Number of starts after the first (...,)."""
     proof: NDArray[np.object_] | None = field(default=None, kw_only=True)
-    """Sentence (...,) that proves a target out of reach; empty where there is none. None stands for no
-    proof."""
+    """Sentence (...,) that proves a target out of reach; empty where there is no proof. None if no target has
+    a proof."""
     collision: NDArray[np.object_] | None = field(default=None, kw_only=True)
     """With `avoid` a sentence (...,) that says which bodies are too close in the solutions found; empty where
     that is not the failure."""

@@ -77,9 +77,9 @@ class EngineBase:
     """Position of the coordinates of a floating base in the q and v of an engine."""
 
     q: tuple[int, ...]
-    """Index of the entries of dynx: position x, y, z, then quaternion x, y, z, w."""
+    """Indices in the engine's q of position x, y, z, then quaternion x, y, z, w."""
     v: tuple[int, ...]
-    """Index of the entries of dynx: linear, then angular velocity."""
+    """Indices in the engine's v of the linear, then the angular velocity."""
     linear_in_world: bool
     """True if the linear velocity is in axes of the world, False in those of the base."""
     angular_in_world: bool

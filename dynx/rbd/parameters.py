@@ -249,8 +249,8 @@ class Payload:
     """A rigid body fixed to a frame of the robot.
 
     `mass` is in kg, `center` (3,) [m] is the centre of mass in `frame`, and `inertia` (3, 3) [kg m^2] the
-    tensor about it in the axes of `frame`. The default is a point mass. Raises ArgumentError for numbers that
-    no body has.
+    tensor about the centre of mass, in the axes of `frame`. The default is a point mass. Raises ArgumentError
+    for numbers that no body has.
     """
 
     frame: str

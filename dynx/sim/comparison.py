@@ -587,12 +587,12 @@ def compare(ours: Any, theirs: Any, *given: Any, **options: Any) -> Any:
     - ``compare(scene, engines, duration, dt=1e-3, substeps=, settings=, samples=, finish=, progress=)``: the
       motions of one scene in the worlds of several engines (`dynx.world.WorldComparison`).
 
-    dynx takes over each difference of two scenarios (an argument of `simulate`, a gain, a link, a joint) from
-    `theirs` into `ours` alone, and simulates again. Then it takes over all differences except this one, and
-    simulates again. If it takes over all differences, the rerun must equal `theirs`. This proves that nothing
-    else is a cause. `tolerance` is the distance [rad or m] up to which rollouts are alike. Without `rerun`
-    dynx only lists the differences. `progress` is called with the number of reruns done and their total
-    number.
+    dynx takes over each single difference of two scenarios (an argument of `simulate`, a gain, a link, a
+    joint) from `theirs` into `ours`, and simulates again. Then it takes over all differences except this one,
+    and simulates again. If it takes over all differences, the rerun must equal `theirs`. This proves that
+    nothing else is a cause. `tolerance` is the distance [rad or m] up to which rollouts are alike. Without
+    `rerun` dynx only lists the differences. `progress` is called with the number of reruns done and their
+    total number.
 
     The engines run the scene for `duration` [s] in steps of `dt` / `substeps` [s], with the `settings` of
     `World` by engine; states are compared at `samples` times. `finish` is called with each world at its end,

@@ -657,9 +657,9 @@ class Viewer(Controls):
     def embed(self, height: int = 500) -> EmbeddedPage:
         """Return the robot or the motion as a page without a server, which a notebook shows and stores.
 
-        It needs neither this program nor a network, so that it also plays in a notebook on another machine
-        and in one that is only read. `height` is in pixels. Raises ArgumentError for a live world, whose
-        motion is not known before it has happened, and for a page of more than 5 MB.
+        It needs neither this program nor a network, so that it also plays in a notebook on another machine,
+        and in a notebook that is only read. `height` is in pixels. Raises ArgumentError for a live world,
+        whose motion is not known before it has happened, and for a page of more than 5 MB.
         """
         from dynx.viewer.export import embedded_page
 

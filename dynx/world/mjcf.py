@@ -40,12 +40,12 @@ def scene_to_mjcf(
     [s].
 
     Links are bodies named ``robot/link``, bodies as in the scene, joints ``robot/joint``, free joints as the
-    robot or body that they move, geoms by their part and number. A motor ``robot/joint`` applies its ctrl
-    [N m or N] to each joint that is no mimic joint. The keyframe ``start`` is the start of the scene. Free
+    robot or body that they move, geoms by their part and number. A motor ``robot/joint`` applies its ctrl [N
+    m or N] to each joint that is no mimic joint. The keyframe ``start`` is the start of the scene. Free
     joints are at centres of mass; meshes are written as their convex hulls. Links that move have the inertia
-    of the links that fixed joints connect to them; what does not move has none. Comments at the beginning
-    name what the document cannot carry. Limits of velocity and effort, added frames and visual shapes are
-    left out; geoms of a link have its first colour.
+    of the links that fixed joints connect to them; links that do not move have none. Comments at the
+    beginning name what the document cannot carry. Limits of velocity and effort, added frames and visual
+    shapes are left out; geoms of a link have its first colour.
 
     Raises UnsupportedFeatureError for an inertia that MuJoCo refuses, such as that of a link that moves
     without mass, and for a ground that moves; DescriptionError for a fault in a collision shape or its mesh;

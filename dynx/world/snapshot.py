@@ -55,7 +55,7 @@ class Snapshot:
     """Time [s] at which `steps` was 0."""
     steps: int
     arrays: Mapping[str, Floats]
-    """Numbers that are kept between steps beside the engine, by name. Of a world: velocity and generalised
+    """Numbers that are kept between steps outside the engine, by name. Of a world: velocity and generalised
     force (2, nv) of the step before, by the robots whose motors depend on it. Of a simulation: ``q``, ``v``
     and the torque ``tau`` of the last control step."""
     data: bytes
@@ -66,8 +66,9 @@ class Snapshot:
     """Torque (nv,) of each robot of a world in the step before (`WorldState.torques`), on which no later step
     depends; empty in files of earlier versions."""
     samples: Mapping[Sensor | str, Floats] = field(default_factory=dict)
-    """Samples (k, 1 + size) of the sensors of a world that are held or delayed, each after its time, on which
-    no later step depends; from a file by the sensors' names, and empty in files of earlier versions."""
+    """Held and delayed samples (k, 1 + size) of each sensor of a world: time, then values. No later step
+    depends on them. Their keys are names if they were read from a file. Empty in files of earlier
+    versions."""
     rollout: int = 0
     """Number of the rollout of a world (`World.rollout`)."""
 

@@ -24,9 +24,8 @@ Integers = NDArray[np.int64]
 class ContactTable:
     """All contacts of a rollout, a row each, in the order of the steps.
 
-    Row k is a contact between ``names[a[k]]`` and ``names[b[k]]`` during step ``step[k]``, which begins at
-    ``t[step[k]]``, in the last of its sub-steps. The other arrays are as in `dynx.world.Contact`, in world
-    axes.
+    Row k is a contact between ``names[a[k]]`` and ``names[b[k]]`` in the last sub-step of step ``step[k]``,
+    which begins at ``t[step[k]]``. The other arrays are as in `dynx.world.Contact`, in world axes.
     """
 
     n_steps: int

@@ -54,8 +54,8 @@ class MomentumObserver(ModelEvaluation):
     change of the external torque the error is below 1 % after 5 time constants, at any rate of samples.
     `wrench` returns the wrench on a link that explains a residual best.
 
-    If it is an attribute of a controller of your own, the backend evaluates it, as with `model_dynamics`. In
-    compiled steps and batches compiled code evaluates it.
+    If the observer is an attribute of a controller of your own, the backend evaluates it, as with
+    `model_dynamics`. In compiled steps and batches compiled code evaluates it.
     """
 
     model: Model
@@ -71,7 +71,7 @@ class MomentumObserver(ModelEvaluation):
     armature: Floats = field(init=False)
     """Armature (nv, nv), which is added to the mass matrix."""
     springs: JointSprings | None = field(init=False)
-    """Springs, whose torque is added to that of the motors; None if there are none."""
+    """Springs, whose torque is added to the torque of the motors; None if there are none."""
     dynamics: Dynamics = field(init=False)
 
     def __init__(

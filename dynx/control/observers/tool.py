@@ -100,8 +100,8 @@ class SensorMotion:
         return not (self.angular_velocity.any() or self.angular_acceleration.any())
 
     def regressor(self) -> Floats:
-        """Return A (n, 6, 10): A pi is the wrench that gives a tool with the ten inertial parameters pi this
-        motion, about the origin of the sensor in its axes."""
+        """Return A (n, 6, 10): A pi is the wrench, about the sensor's origin in its axes, that gives a tool
+        with the ten inertial parameters pi this motion."""
         at = np.eye(3), np.zeros(3)
         moving = self.acceleration, self.angular_velocity, self.angular_acceleration
         return np.asarray(FrameMotion.of(*at, *moving).wrench)

@@ -158,8 +158,8 @@ class IKSolutions(IKResult):
 
     @cached_property
     def arbitrary(self) -> Mask:
-        """Coordinates (..., nq) that can have any value at a singular pose, if another follows: infinitely
-        many configurations reach the pose, of which q is one."""
+        """Coordinates (..., nq) that can have any value at a singular pose, if another coordinate follows:
+        infinitely many configurations reach the pose, of which q is one."""
         return np.zeros(self.q.shape, dtype=np.bool_)
 
     @cached_property

@@ -322,7 +322,7 @@ def stored_closed_form(
 
 
 def redundant_joints(model: Model, frame: str, given: Mapping[str, float] | None = None) -> tuple[str, ...]:
-    """Return the joints between world and frame of which one, if it is given, leaves a closed form."""
+    """Return the joints between world and frame, of which any one that is given leaves a closed form."""
     joints = chain_to(model, frame, {} if given is None else given).joints
     found = _remedies(model, frame, {} if given is None else given, [(joint,) for joint in joints])
     return tuple(joint for (joint,) in found)

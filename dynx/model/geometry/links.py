@@ -84,7 +84,8 @@ ShapeNumber = tuple[str, int]
 
 @dataclass(frozen=True)
 class ContactFilter:
-    """Which collision shapes of a robot may touch, as MJCF states it. It is data: scenes have their own.
+    """Which collision shapes of a robot may touch, as MJCF states it. It is only data: a world uses the
+    filter of its scene.
 
     Two shapes may touch if contype of one and conaffinity of the other share a bit. They do not touch if
     their links are `excluded` or rigidly connected, or if one joint connects the links and neither is fixed
@@ -122,7 +123,7 @@ class Geometry:
     """The shapes of every link of a robot, by the name of the link.
 
     dynx reads the shapes of a description at their first use. A fault in a shape raises an error at the first
-    use of the shapes of that kind of its link, not in `dynx.load`.
+    use of the visual or collision shapes of its link, not in `dynx.load`.
     """
 
     def __init__(self, links: Links | Callable[[], Links]) -> None:
@@ -152,10 +153,9 @@ class Geometry:
         return found.collisions
 
     def for_links(self, names: Iterable[str]) -> Geometry:
-        """Return the geometry with an entry for each of these links; one without shapes has an empty entry.
-
-        That of a description, which has them already, is returned as it is. Raises UnknownNameError for an
-        entry of another link.
+        """Return the geometry with an entry for each of these links; a link without shapes has an empty
+        entry. The geometry of a description has these entries, and is returned unchanged. Raises
+        UnknownNameError for an entry of another link.
         """
         if callable(self._links_or_reader):
             return self

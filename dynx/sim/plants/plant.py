@@ -80,7 +80,7 @@ class Plant(ABC):
         return None
 
     def restore(self, memory: Any) -> None:
-        """Return to what `save` returned; q and v were set before. Nothing is to be done without a memory."""
+        """Return to what `save` returned; q and v were set before. A plant without a memory does nothing."""
         return
 
     def surroundings(self, n: int) -> Surroundings | None:

@@ -62,7 +62,7 @@ def require_plant(name: str) -> None:
 
 @checks_types
 def register(name: str, loader: Callable[[], type[Plant]]) -> None:
-    """Add a plant class of the running program; `loader()` returns it when it is first used.
+    """Add a plant class of the running program; dynx calls `loader()`, which returns it, at the first use.
 
     Raises ArgumentError for a name that is taken by another plant or by a backend of dynx.
     """

@@ -59,7 +59,7 @@ def _vectors(reach: float) -> Strategy[Vector]:
 
 @lru_cache(maxsize=1)
 def unit_vectors() -> Strategy[Vector]:
-    """Draw a direction: the six along the axes, or any. Shrinks to z."""
+    """Draw a direction: one of the six along the axes, or any other. Shrinks to z."""
     return st.one_of(
         st.sampled_from(CARDINAL_AXES),
         st.builds(_on_sphere, st.floats(0.0, 2.0, allow_nan=False), angles()),

@@ -121,8 +121,8 @@ class SensorErrors:
         return np.asarray(np.array(self.noise) + np.array(self.noise_density) / math.sqrt(period))
 
     def applied(self, true: Floats, period: float, normal: Floats, walk: Floats) -> Floats:
-        """Return the readings of `true` (n, m) in samples with normal numbers (n, m) and the sums (n, m) of
-        those of the random walk, `period` [s] apart."""
+        """Return the readings of `true` values (n, m), from the normal numbers (n, m) of the noise and the
+        sums (n, m) of the normal numbers of the random walk; samples are `period` [s] apart."""
         found = true + np.array(self.bias) + np.array(self.scale) * true
         cross = np.array(self.cross_axis)
         if cross.any():

@@ -85,8 +85,8 @@ class ForceTorqueSensor(PlacedSensor):
         return self._on_frame(robot, model, frame, None if number is None else model.joints[number])
 
     def mounting(self, model: Model, name: str) -> tuple[int | None, str]:
-        """Return the number of the joint that is measured, None for the foundation, and the frame in which
-        the sensor has its pose."""
+        """Return the number of the measured joint (None for the foundation), and the frame in which the
+        sensor has its pose."""
         for k, joint in enumerate(model.joints):
             if joint.name == name:
                 return k, joint.child
@@ -156,8 +156,8 @@ class JointTorqueSensor(Sensor):
     """A sensor of the ``torque`` [N m], or the force [N], that a joint transmits along its axis to its child
     link.
 
-    It lies between the gear and the link: friction and armature of the joint, which act between the motor and
-    the gear, are not in it. The torque of the motor is `Rollout.tau` and `World.torque`.
+    It lies between the gear and the link. Its reading does not contain friction and armature of the joint,
+    which act between the motor and the gear. The torque of the motor is `Rollout.tau` and `World.torque`.
     """
 
     torque: SensorErrors = NO_ERRORS

@@ -35,8 +35,8 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Sensor(ABC):
-    """A sensor `on` a part: ``robot/frame``, ``robot/joint`` or a body; the frame or joint alone in a
-    simulation, and in a scene of one robot.
+    """A sensor `on` a part: ``robot/frame``, ``robot/joint`` or a body. In a simulation, and in a scene of
+    one robot, the name of the frame or joint suffices.
 
     `rate` [Hz] is the number of samples per second; by default there is one sample in each step. A sample is
     taken at the beginning of the first step at or after each multiple of ``1 / rate``, and can be read
