@@ -389,7 +389,8 @@ def _with_constraints(draw: st.DrawFn, scene: Scene) -> Scene:
         others = [end for end in ends if end != a and end not in {c.a for c in made}]
         links = [end for end in others if "/" in end]
         # Few scenes have both robots and constraints: half of the constraints of these are to a link.
-        b = draw(st.sampled_from(links if links and draw(st.booleans()) else others))
+        linked: bool = bool(links) and draw(st.booleans())
+        b: str = draw(st.sampled_from(links if linked else others))
         if draw(st.booleans()):
             made.append(Weld(a, b))
             continue
