@@ -18,6 +18,7 @@ from dynx.model import Model
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.call_sequence import CallSequence, Integers, StridedRows
 from dynx.simd.kernel import Kernel
+from dynx.simd.repetition import load_repetition, trace_repetition
 from dynx.simd.trace import trace
 from dynx.simd.user_code.arrays import traced_array
 from dynx.simd.user_code.numbers import as_symbol
@@ -53,6 +54,8 @@ class StepText:
     """Beginning of the error where it cannot be traced."""
     key: Hashable | None = None
     """Content that finds the kernel in this process without tracing; None: trace."""
+    repeats: bool = False
+    """True if the function has a loop: it takes ``repeat`` too (`dynx.simd.repetition`)."""
 
 
 _kernels: dict[Hashable, Kernel] = {}
@@ -82,11 +85,15 @@ def compiled(text: StepText) -> Kernel:
     """
     kernel = None if text.key is None else _kernels.get(text.key)
     if kernel is None:
+        shapes = {name: (size,) for name, size in text.inputs.items()}
         try:
-            program = trace(text.function, {name: (size,) for name, size in text.inputs.items()})
+            if text.repeats:
+                kernel = load_repetition(trace_repetition(text.function, shapes))
+            else:
+                program = trace(text.function, shapes)
+                kernel = load_kernel(program_recipe(program), lambda: program)
         except TraceError as error:
             raise UnsupportedFeatureError(f"{text.failure}: {error}") from error
-        kernel = load_kernel(program_recipe(program), lambda: program)
         if text.key is not None:
             _kernels[text.key] = kernel
             for old in list(_kernels)[:-MAX_CACHED_KERNELS]:

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from dynx.simd.elementary import elementary
 from dynx.simd.expr import Op
 from dynx.simd.ir_writer import Writer
-from dynx.simd.program import Program, scalar_ranges
+from dynx.simd.program import Port, Program, scalar_ranges
 from dynx.simd.rows import (
     FILL,
     LOAD,
@@ -52,6 +52,8 @@ PREFETCH_GROUPS = 8
 
 PREFETCH_TO_READ, PREFETCH_TO_WRITE = "i32 0, i32 2", "i32 1, i32 3"
 """Hints of LLVM's prefetch: whether the memory will be written, and how near the processor it shall be."""
+
+DECLARED_PREFETCH = "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)"
 
 CACHE_LINE = 64
 """Size of a cache line [bytes]."""
@@ -166,7 +168,7 @@ def _called(segments: int, settings: Settings) -> list[str]:
 
 def _module(functions: Sequence[str], target: Processor, settings: Settings) -> str:
     parts = [f'target triple = "{target.triple}"', *functions, *replacements(functions, settings.lanes)]
-    parts += [*declarations(settings.lanes), "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)"]
+    parts += [*declarations(settings.lanes), DECLARED_PREFETCH]
     return "\n".join(parts) + "\n"
 
 
@@ -186,7 +188,7 @@ def _loop(program: Program, settings: Settings, segments: Sequence[Segment], slo
         f"  %kept = alloca [{slots} x <{lanes} x double>], align 64",
         "  %n = load i64, ptr %arguments",
         f"  %last = sub i64 %n, {lanes}",
-        *_prefetch_pointers(program),
+        *prefetch_pointers(program.inputs, program.outputs),
         *([f"  call void @{FILL}(ptr %kept)"] if settings.quick else []),
         *streaming.begin(constant),
         "  br label %group",
@@ -195,7 +197,7 @@ def _loop(program: Program, settings: Settings, segments: Sequence[Segment], slo
         "  %late = icmp sgt i64 %i, %last",
         "  %first = select i1 %late, i64 %last, i64 %i",
     ]
-    lines += _prefetch(program, lanes)
+    lines += prefetch(program.inputs, program.outputs, lanes)
     lines += streaming.before_group()
     varying = [name for name in called if name not in constant]
     lines += [f"  call void @{name}(ptr {words}, i64 %first, ptr %kept)" for name in varying]
@@ -212,16 +214,15 @@ def _loop(program: Program, settings: Settings, segments: Sequence[Segment], slo
     return "\n".join(lines)
 
 
-def _prefetched_arrays(program: Program) -> list[tuple[int, int]]:
+def _prefetched_arrays(ports: Sequence[Port]) -> list[tuple[int, int]]:
     """List (array number, row length) of the arrays whose rows are prefetched."""
-    ports = enumerate((*program.inputs, *program.outputs))
-    return [(number, port.size) for number, port in ports if port.size in PREFETCHED_COLUMNS]
+    return [(number, port.size) for number, port in enumerate(ports) if port.size in PREFETCHED_COLUMNS]
 
 
-def _prefetch_pointers(program: Program) -> list[str]:
+def prefetch_pointers(inputs: Sequence[Port], outputs: Sequence[Port]) -> list[str]:
     """Return the code that loads addresses and row strides of the prefetched arrays."""
     lines = []
-    for k, _ in _prefetched_arrays(program):
+    for k, _ in _prefetched_arrays([*inputs, *outputs]):
         lines += [
             f"  %at{k} = getelementptr inbounds i64, ptr %arguments, i64 {1 + 2 * k}",
             f"  %base{k} = load ptr, ptr %at{k}",
@@ -231,11 +232,11 @@ def _prefetch_pointers(program: Program) -> list[str]:
     return lines
 
 
-def _prefetch(program: Program, lanes: int) -> list[str]:
+def prefetch(inputs: Sequence[Port], outputs: Sequence[Port], lanes: int) -> list[str]:
     """Return the code that prefetches the rows of a later group; a prefetch beyond an array is harmless."""
     lines = []
-    for k, size in _prefetched_arrays(program):
-        hint = PREFETCH_TO_READ if k < len(program.inputs) else PREFETCH_TO_WRITE
+    for k, size in _prefetched_arrays([*inputs, *outputs]):
+        hint = PREFETCH_TO_READ if k < len(inputs) else PREFETCH_TO_WRITE
         for lane in range(lanes):
             row = f"{k}_{lane}"
             lines += [

@@ -60,22 +60,28 @@ def _traced(
     ports = [Port(name, tuple(shape)) for name, shape in inputs.items()]
     arguments: dict[str, Array] = {}
     for port, slots in scalar_ranges(ports):
-        symbols = np.empty(port.size, dtype=object)
-        symbols[:] = [Symbol(graph, graph.input(slot)) for slot in slots]
-        arguments[port.name] = symbols.reshape(port.shape)
+        arguments[port.name] = symbols(graph, port, slots.start)
     returned = function(**arguments)
     arrays = returned if isinstance(returned, Mapping) else {"result": returned}
     outputs, results = [], []
     for name, value in arrays.items():
         array = np.asarray(value, dtype=object)
         outputs.append(Port(name, array.shape))
-        results += [_node(graph, name, entry) for entry in array.ravel().tolist()]
+        results += [result_node(graph, name, entry) for entry in array.ravel().tolist()]
     program = extract_program(graph, ports, outputs, results)
     check_program(program)
     return program
 
 
-def _node(graph: Graph, name: str, entry: Any) -> int:
+def symbols(graph: Graph, port: Port, first: int) -> Array:
+    """Return an array of symbols of the inputs of a graph from number `first` on, in the shape of a port."""
+    found = np.empty(port.size, dtype=object)
+    found[:] = [Symbol(graph, graph.input(slot)) for slot in range(first, first + port.size)]
+    return found.reshape(port.shape)
+
+
+def result_node(graph: Graph, name: str, entry: Any) -> int:
+    """Return the node of an entry of the result `name`, a symbol or a number."""
     if isinstance(entry, Symbol):
         if entry.graph is not graph:
             raise TraceError(f"result {name} holds a symbol of another trace")

@@ -1,0 +1,202 @@
+"""The step with contacts: against floats, a dense computation, 50 digits, and laws of mechanics."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.compiled.contact_step import contact_step_text
+from dynx.compiled.step import compiled
+from dynx.errors import UnknownNameError, UnsupportedFeatureError
+from dynx.model import Model
+from dynx.rbd.constraints import solve
+from dynx.rbd.contact_step import ServoJoints, SpheresOnPlane, Sweeps, contact_step
+from dynx.rbd.integration import SemiImplicitEuler
+from dynx.spatial.scalar import Floats
+from tests.rbd.exact import exact_mechanism, exactly, fifty_digits
+
+H, KP, KD, FRICTION, RADIUS = 1e-3, 100.0, 2.0, 0.7, 0.02
+FEET = ("FR_foot", "FL_foot", "RR_foot", "RL_foot")
+STANCE = np.tile([0.0, 0.9, -1.8], 4)
+TIGHT = Sweeps(tolerance=1e-12, most=400)
+SLOPE = 0.5
+SLOPING = (
+    (-SLOPE / math.hypot(1.0, SLOPE), 0.0, 1.0 / math.hypot(1.0, SLOPE)),
+    (1.0 / math.hypot(1.0, SLOPE), 0.0, SLOPE / math.hypot(1.0, SLOPE)),
+    (0.0, 1.0, 0.0),
+)
+
+
+@cache
+def a1() -> Model:
+    return dynx.load("a1", base="floating")
+
+
+def text_of(model: Model, **options: Any) -> Any:
+    given = {"h": H, "kp": KP, "kd": KD, "friction": FRICTION, **options}
+    return contact_step_text(model, dict.fromkeys(FEET, RADIUS), **given)
+
+
+def states(n: int, seed: int = 0) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return random states near the ground: q, v, targets, impulses."""
+    rng = np.random.default_rng(seed)
+    q = np.tile(a1().neutral(), (n, 1))
+    q[:, :3] = rng.uniform(-0.3, 0.3, (n, 3))
+    q[:, 2] = rng.uniform(0.24, 0.30, n)
+    q[:, 3:6] = rng.uniform(-0.15, 0.15, (n, 3))
+    q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
+    q[:, 7:] = STANCE + rng.uniform(-0.3, 0.3, (n, 12))
+    v = rng.uniform(-1.0, 1.0, (n, 18))
+    return q, v, STANCE + rng.uniform(-0.3, 0.3, (n, 12)), rng.uniform(0.0, 0.05, (n, 12))
+
+
+def steps(kernel: Any, *arrays: Floats) -> list[Floats]:
+    """Return q, v, impulses and residual after a step of states (n, ...)."""
+    found = [np.empty((len(arrays[0]), port.size)) for port in kernel.outputs]
+    kernel(list(arrays), found)
+    return found
+
+
+def dense_step(q: Floats, v: Floats, target: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return q, v and impulses after a step, from mass matrix, bias and Jacobians of `reference` in the axes
+    of the world, which do not rotate."""
+    model, robot = a1(), dynx.backend("reference", a1())
+    M = robot.mass_matrix(q) + np.diag([0.0] * 6 + [H * KD + H * H * KP] * 12)
+    motors = np.concatenate([np.zeros(6), KP * (target - q[7:] - H * v[6:]) - KD * v[6:]])
+    free = np.linalg.solve(M, motors - robot.bias_torque(q, v))
+    rows, gaps = [], []
+    for foot in FEET:
+        T = robot.forward_kinematics(q, foot)
+        point = T[:3, :3].T @ np.array([0.0, 0.0, -RADIUS])
+        J = robot.jacobian(q, foot, point=point)[:3]
+        rows.append(J[[2, 0, 1]])
+        gaps.append(T[2, 3] - RADIUS)
+    J = np.concatenate(rows)
+    # The velocity of the base's origin in axes that do not rotate, from its components in the base's axes.
+    w, center = v[3:6], model.mechanism.root_center
+    turned = np.cross(w, v[:3]) + np.cross(w, np.cross(w, center))
+    moved = np.concatenate([v[:3] + H * turned, v[3:]])
+    c = J @ (moved + H * free)
+    gap = np.array(gaps)
+    c[::3] += np.maximum(gap / H, np.maximum(0.2 * gap / H, -0.1))
+    sets = SpheresOnPlane(tuple(range(4)), (RADIUS,) * 4, FRICTION).sets
+    found = solve(sets, J @ np.linalg.solve(M, J.T), c, np.full(4, FRICTION))
+    a = free + np.linalg.solve(M, J.T @ found.impulses) / H
+    q, v, _ = SemiImplicitEuler(model, H).moved(q, v, a)
+    return q, v, found.impulses
+
+
+def test_a_step_is_that_of_dense_matrices() -> None:
+    kernel = compiled(text_of(a1(), sweeps=TIGHT))
+    q, v, target, impulses = states(24)
+    found = steps(kernel, q, v, target, impulses)
+    assert 0 < np.count_nonzero(found[2][:, ::3]) < found[2][:, ::3].size
+    for k in range(len(q)):
+        for mine, wanted in zip(found, dense_step(q[k], v[k], target[k]), strict=False):
+            np.testing.assert_allclose(mine[k], wanted, rtol=0.0, atol=1e-9)
+
+
+def test_floats_and_fifty_digits_agree_with_the_kernel() -> None:
+    model = a1()
+    text = text_of(model, sweeps=TIGHT)
+    kernel = compiled(text)
+    given = [each[:1] for each in states(3, seed=2)]
+    found = steps(kernel, *given)
+    assert np.count_nonzero(found[2][0, ::3]) >= 2
+    names = ("q", "v", "target", "impulses")
+    on_floats = text.function(**dict(zip(names, (each[0] for each in given), strict=True)))
+    for mine, wanted in zip(found, on_floats.values(), strict=True):
+        np.testing.assert_allclose(mine[0], np.asarray(wanted, dtype=float), rtol=0.0, atol=1e-9)
+    touching = SpheresOnPlane(tuple(map(model.frame_index, FEET)), (RADIUS,) * 4, FRICTION)
+    zero = np.zeros(12)
+    joints = ServoJoints(np.full(12, KP), np.full(12, KD), zero, zero)
+    with fifty_digits():
+        q, v, target, impulses = (exactly(each[0]) for each in given)
+        found_exactly = contact_step(
+            exact_mechanism(model), joints, touching, TIGHT, H, q, v, target, impulses
+        )
+        for mine, wanted in zip(found, found_exactly.values(), strict=True):
+            np.testing.assert_allclose(mine[0], np.asarray(wanted, dtype=float), rtol=0.0, atol=1e-9)
+
+
+def test_a_robot_has_the_same_bits_alone_and_in_any_batch() -> None:
+    kernel = compiled(text_of(a1()))
+    given = states(45)
+    whole = steps(kernel, *given)
+    order = np.random.default_rng(1).permutation(45)
+    for a, b in zip(whole, steps(kernel, *(each[order] for each in given)), strict=True):
+        assert np.array_equal(a[order], b)
+    for k in (0, 7, 21, 44):
+        for a, b in zip(whole, steps(kernel, *(each[k : k + 1] for each in given)), strict=True):
+            assert np.array_equal(a[k : k + 1], b)
+    assert whole[3].max() <= 1e-6
+
+
+def test_a_robot_that_diverges_changes_no_other() -> None:
+    kernel = compiled(text_of(a1()))
+    given = states(16)
+    clean = steps(kernel, *given)
+    given[1][5, 8] = np.nan
+    found = steps(kernel, *given)
+    others = np.arange(16) != 5
+    for a, b in zip(found, clean, strict=True):
+        assert np.array_equal(a[others], b[others])
+    assert np.isnan(found[1][5]).any()
+
+
+def rested(kernel: Any, seconds: float, height: float) -> list[Floats]:
+    """Return the last state of two robots that settle from the stance."""
+    q = np.tile(a1().neutral(), (2, 1))
+    q[:, 2], q[:, 7:] = height, STANCE
+    state = [q, np.zeros((2, 18)), np.zeros((2, 12))]
+    target = np.tile(STANCE, (2, 1))
+    for _ in range(round(seconds / H)):
+        *state, _ = steps(kernel, state[0], state[1], target, state[2])
+    return state
+
+
+def test_standing_on_a_plane_and_on_a_slope() -> None:
+    """The forces sum to the weight, and nothing creeps within the cone of friction (tan 0.5 < 0.7)."""
+    weight = float(a1().total_mass) * 9.81
+    stiff = {"kp": 400.0, "kd": 20.0}
+    flat = rested(compiled(text_of(a1(), **stiff)), 6.0, 0.27)
+    forces = flat[2][0].reshape(4, 3) / H
+    assert abs(forces[:, 0].sum() / weight - 1.0) < 1e-6
+    assert np.abs(flat[1]).max() < 1e-9
+    slope = compiled(text_of(a1(), axes=SLOPING, **stiff))
+    state = rested(slope, 6.0, 0.30)
+    total = np.einsum("k,ki->i", np.ones(4), state[2][0].reshape(4, 3)) @ np.array(SLOPING) / H
+    np.testing.assert_allclose(total, [0.0, 0.0, weight], atol=1e-6 * weight)
+    assert np.abs(state[1]).max() < 1e-9
+
+
+def test_a_fixed_base_and_prismatic_joints() -> None:
+    """A ball on a vertical slide without a motor falls, lands, and bears its weight."""
+    inertia = "<inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>"
+    ball = f"<link name='ball'><inertial><mass value='2'/>{inertia}</inertial></link>"
+    slide = (
+        "<joint name='slide' type='prismatic'><parent link='base'/><child link='ball'/><axis xyz='0 0 1'/>"
+        "<limit lower='-9' upper='9' effort='9' velocity='9'/></joint>"
+    )
+    model = dynx.load(f"<robot name='slider'><link name='base'/>{ball}{slide}</robot>")
+    kernel = compiled(contact_step_text(model, {"ball": 0.1}, h=H, kp=0.0, kd=0.0, friction=0.5))
+    state = [np.array([[0.15]]), np.zeros((1, 1)), np.zeros((1, 3))]
+    for step in range(200):
+        *state, residual = steps(kernel, state[0], state[1], np.zeros((1, 1)), state[2])
+        if step == 50:
+            np.testing.assert_allclose(state[1], -9.81 * 51 * H, rtol=1e-12)
+        assert residual.max() <= 1e-6
+    np.testing.assert_allclose(state[0], 0.1, atol=1e-12)
+    np.testing.assert_allclose(state[2][0] / H, [2.0 * 9.81, 0.0, 0.0], atol=1e-9)
+
+
+def test_robots_that_the_step_lacks_are_refused_by_name() -> None:
+    with pytest.raises(UnsupportedFeatureError, match="mimic joints"):
+        contact_step_text(dynx.load("panda"), {"panda_hand": 0.1}, h=H, kp=1.0, kd=1.0, friction=0.5)
+    with pytest.raises(UnknownNameError, match="FR_foot"):
+        contact_step_text(a1(), {"FR_fot": 0.1}, h=H, kp=1.0, kd=1.0, friction=0.5)
