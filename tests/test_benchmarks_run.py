@@ -44,6 +44,13 @@ def test_simulators_are_right_and_timed() -> None:
     assert all(each["step"] > 0.0 and each["checks"] for each in results)
 
 
+def test_robots_on_their_feet_obey_the_laws_of_contact() -> None:
+    quick = ["--batch", "16", "--mujoco-batch", "2", "--seconds", "0.1", "--motion", "standing"]
+    finished = run("benchmarks.contact_steps", *quick)
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    assert "standing: dynx " in finished.stdout
+
+
 def test_two_checkouts_are_timed_side_by_side(tmp_path: Path) -> None:
     file = tmp_path / "rows.json"
     names = ["call compiled inverse_dynamics", "quantity ur5 mass_matrix 128", "rollouts compiled"]

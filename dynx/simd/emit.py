@@ -176,11 +176,9 @@ def _loop(program: Program, settings: Settings, segments: Sequence[Segment], slo
     """Return the entry function, a loop over groups of `lanes` samples, of which the last may overlap; and
     what it needs to stream rows of results."""
     lanes, streaming = settings.lanes, Streaming(program, settings.lanes)
-    called, constant = _called(len(segments), settings), []
-    if not settings.quick:
-        constant = [name for name, segment in zip(called, segments, strict=True) if segment.constant]
-    words = "%words" if streaming.arrays else "%arguments"
-    start = "begin" if streaming.arrays else "entry"
+    called = _called(len(segments), settings)
+    constant = [] if settings.quick else [f"segment{k}" for k, each in enumerate(segments) if each.constant]
+    words, start = ("%words", "begin") if streaming.arrays else ("%arguments", "entry")
     lines = [
         *streaming.functions(),
         f"define void @{ENTRY}(ptr noalias nocapture readonly %arguments) {{",

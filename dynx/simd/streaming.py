@@ -81,8 +81,7 @@ class Streaming:
         """
         if not self.arrays:
             return []
-        samples = -(-MIN_STREAMED // sum(array.row for array in self.arrays))
-        copied = 8 * self._words
+        samples, copied = -(-MIN_STREAMED // sum(array.row for array in self.arrays)), 8 * self._words
         return [
             f"  %block = alloca [{self._block} x i8], align {_LINE}",
             f"  %changed = alloca [{self._words} x i64], align 8",
