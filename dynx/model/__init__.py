@@ -33,12 +33,20 @@ __all__ = [
     "NamedConfiguration",
     "Note",
     "Pose",
+    "StatedEquality",
+    "StatedGravityCompensation",
     "StatedSensor",
+    "StatedTendon",
     "build_mechanism",
 ]
 
 # Hidden from type checkers, which would take any name for an attribute.
 if not TYPE_CHECKING:
-    __getattr__ = moved_names(__name__, {}, {"StatedSensor": "dynx.model.sensors"})
+    _STATED = {"Equality": "equalities", "GravityCompensation": "gravity_compensation"}
+    _STATED |= {"Sensor": "sensors", "Tendon": "tendons"}
+    __getattr__ = moved_names(__name__, {}, {f"Stated{k}": f"dynx.model.{v}" for k, v in _STATED.items()})
 else:
+    from dynx.model.equalities import StatedEquality
+    from dynx.model.gravity_compensation import StatedGravityCompensation
     from dynx.model.sensors import StatedSensor
+    from dynx.model.tendons import StatedTendon

@@ -23,6 +23,7 @@ from dynx.files.temporary import temporary_folder
 from dynx.files.writing import write_bytes
 from dynx.model.document_format import SUFFIXES, Format
 from dynx.model.elements import Frame, Inertial, Joint, Pose
+from dynx.model.equalities import StatedEquality
 from dynx.model.geometry import (
     Box,
     Capsule,
@@ -41,6 +42,7 @@ from dynx.model.mjcf.sensor_objects import SensorObjects
 from dynx.model.mjcf.writer import MESH_SUFFIXES, RobotWriter
 from dynx.model.model import Model
 from dynx.model.sdf.writer import SdfWriter
+from dynx.model.tendons import StatedTendon
 from dynx.model.urdf.writer import urdf_notes, urdf_text
 from dynx.spatial.scalar import Floats
 
@@ -200,8 +202,11 @@ def robot_differences(model: Model, back: Model) -> Iterator[str]:
                 yield f"the {found} of link {shown(link.name)} differs"
     if model.actuators is not None and back.actuators is not None:
         moving = {joint.name for joint in model.joints if joint.moves}
-        if back.actuators != tuple(each for each in model.actuators if each.joint in moving):
+        tendons = {each.name for each in back.tendons or () if each.name}
+        kept = (each for each in model.actuators if each.joint in moving or each.tendon in tendons)
+        if back.actuators != tuple(kept):
             yield "the actuators differ"
+    yield from _data_differences(model, back)
     if model.sensors is not None and back.sensors is not None:
         parts = SensorObjects.of(back)
         if back.sensors != tuple(each for each in model.sensors if parts.missing(each) is None):
@@ -223,6 +228,62 @@ def robot_differences(model: Model, back: Model) -> Iterator[str]:
         other = frames.get(frame.name)
         if other is not None and not _same_frame(frame, other, size):
             yield f"the placement of frame {shown(frame.name)} differs"
+
+
+def _data_differences(model: Model, back: Model) -> Iterator[str]:
+    """Yield sentences on tendons, constraints, gravity compensation and the initial configuration; nothing
+    where a format leaves them open."""
+    moving = {joint.name for joint in model.joints if joint.moves}
+    if model.tendons is not None and back.tendons is not None:
+        kept = tuple(each for each in model.tendons if moving.issuperset(each.joints))
+        if len(back.tendons) != len(kept) or not all(map(_same_tendon, kept, back.tendons)):
+            yield "the tendons differ"
+    if model.equalities is not None and back.equalities is not None:
+        names = SensorObjects.of(back).names
+        left = list(back.equalities)
+        for each in model.equalities:
+            found = next((other for other in left if _same_equality(each, other)), None)
+            if found is not None:
+                left.remove(found)
+            elif set(each.objects).issubset(names.get(each.object_type, ())) and each.type != "connect":
+                yield f"equality constraint {shown(each.name or each.first)} differs"
+        for other in left:
+            yield f"equality constraint {shown(other.name or other.first)} differs"
+    compensations = model.gravity_compensation, back.gravity_compensation
+    if None not in compensations and compensations[0] != compensations[1]:
+        yield "the gravity compensation differs"
+    if model.stated_initial is not None and back.stated_initial is not None:
+        coupled = {name for joint in model.joints if joint.mimic for name in (joint.name, joint.mimic.joint)}
+        at = [model.position_index(name) for name in model.joint_names if name in coupled]
+        mine, theirs = (np.array(each.initial_configuration) for each in (model, back))
+        mine[at] = 0.0
+        for k in model.quaternions if mine.shape == theirs.shape else ():
+            theirs[k : k + 4] *= np.sign(theirs[k : k + 4] @ mine[k : k + 4])
+        if mine.shape != theirs.shape or not _close(theirs, mine):
+            yield "the initial configuration differs"
+
+
+def _same_tendon(mine: StatedTendon, theirs: StatedTendon) -> bool:
+    """Check whether two tendons are equal, the length of the spring to rounding."""
+    lengths = np.array(theirs.spring_length), np.array(mine.spring_length)
+    return replace(theirs, spring_length=mine.spring_length) == mine and _close(*lengths)
+
+
+def _same_equality(mine: StatedEquality, theirs: StatedEquality) -> bool:
+    """Check whether two constraints are equal to rounding. Their references may differ, if the polynomials
+    allow for it."""
+    poses = (mine.first_pose, theirs.first_pose), (mine.second_pose, theirs.second_pose)
+    size = max([1.0, *(abs(x) for pair in poses for pose in pair for x in pose.xyz)])
+    if not all(_same_pose(*pair, size) for pair in poses):
+        return False
+    alike = replace(
+        theirs,
+        first_pose=mine.first_pose,
+        second_pose=mine.second_pose,
+        polynomial=mine.polynomial,
+        references=mine.references,
+    )
+    return alike == mine and _close(theirs.absolute_polynomial, mine.absolute_polynomial)
 
 
 def _same_configuration(model: Model, back: Model, name: str) -> bool:

@@ -126,7 +126,9 @@ class Pose:
     def __post_init__(self) -> None:
         for name, part in (("xyz", self.xyz), ("rpy", self.rpy)):
             if type(part) is not tuple or len(part) != 3:
-                _refuse_part(name, part)
+                from dynx.model.pose_errors import refuse_part
+
+                refuse_part(name, part)
 
     @classmethod
     def from_matrix(cls, T: ArrayLike, name: str = "T") -> Pose:
@@ -149,18 +151,6 @@ class Pose:
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Floats:
         """Return a copy of `matrix`, so that NumPy takes a pose wherever a matrix (4, 4) is taken."""
         return np.array(self.matrix, dtype=dtype)
-
-
-def _refuse_part(name: str, part: object) -> None:
-    """Raise ShapeError for xyz or rpy of a pose that has not three entries."""
-    shape = np.shape(np.array(part, dtype=object))
-    if shape == (3,):
-        return
-    hint = "; Pose.from_matrix(((x, y, z), (qx, qy, qz, qw))) makes a pose of a quaternion"
-    raise ShapeError(
-        f"{name} of a pose is {shown(part)}, of shape {shape}; wanted 3 numbers, "
-        f"{'x, y, z [m]' if name == 'xyz' else 'roll, pitch, yaw [rad]'}{hint if shape == (4,) else ''}"
-    )
 
 
 IDENTITY = Pose()
@@ -339,11 +329,13 @@ class Joint:
 
 @dataclass(frozen=True)
 class Actuator:
-    """Actuator of a joint, as a robot description states it. It is data: dynx applies no actuator.
+    """Actuator of a joint or tendon, as a robot description states it. It is data: dynx applies no actuator.
 
     With the command u, and the position q and velocity v of the joint, the force is
     ``f = gain u + bias[0] + bias[1] gear q + bias[2] gear v``, and the effort is ``gear f`` [N m or N], as in
-    MuJoCo. u is kept within `control_range`, f within `force_range`. `name` may be empty.
+    MuJoCo. u is kept within `control_range`, f within `force_range`. `name` may be empty. If the actuator
+    acts on a `tendon`, `joint` is empty, q and v are length and velocity of the tendon, and the effort is the
+    tension.
     """
 
     name: str
@@ -354,6 +346,7 @@ class Actuator:
     control_range: tuple[float, float] = (-INFINITY, INFINITY)
     force_range: tuple[float, float] = (-INFINITY, INFINITY)
     line: int | None = field(default=None, compare=False)
+    tendon: str = ""
 
 
 @dataclass(frozen=True)

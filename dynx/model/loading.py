@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import PurePath
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -234,7 +235,9 @@ def build_described(
             line=content.unread.line,
         ) from None
     if content.configurations is not None:
-        model = replace(model, stated_configurations=content.configurations, sensors=content.sensors)
+        data: Any = {name: getattr(content, name) for name in ("sensors", "tendons", "equalities")}
+        data |= {"stated_configurations": content.configurations, "stated_initial": content.initial}
+        model = replace(model, gravity_compensation=content.gravity_compensation, **data)
     return _with_frames(model, content.frames, source) if content.frames else model
 
 

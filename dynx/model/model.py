@@ -192,22 +192,9 @@ class Model(Tree):
     def __repr__(self) -> str:
         return f"<Model {self.name}: {self.base} base, nq {self.nq}, nv {self.nv}, {len(self.links)} links>"
 
+    @door("dynx.model.model_page:model_page")
     def _repr_html_(self) -> str:
-        rows = (
-            (
-                joint.name,
-                joint.type,
-                joint.parent,
-                joint.child,
-                *(f"{x:.4g}" for x in (joint.limits.lower, joint.limits.upper)),
-                *(f"{x:.4g}" for x in (joint.limits.velocity, joint.limits.effort)),
-            )
-            for joint in self.coordinate_joints
-        )
-        head = ("joint", "type", "parent", "child", "lower", "upper", "velocity", "effort")
-        from dynx.files.pages import html_grid  # most models are shown on no page
-
-        return html_grid(f"{repr(self)[1:-1]}, {self.total_mass:.6g} kg", head, rows)
+        raise NotImplementedError
 
     def __getstate__(self) -> dict[str, Any]:
         fields = self.__dataclass_fields__

@@ -41,6 +41,13 @@ def named_configurations(tree: Tree) -> Mapping[str, Floats]:
     return MappingProxyType(found)
 
 
+def initial_configuration(tree: Tree) -> Floats:
+    """Return the configuration q (nq,) in which the description of a robot places it, read-only."""
+    q = coordinates_of(tree, tree.stated_initial or NamedConfiguration(""))
+    q.setflags(write=False)
+    return q
+
+
 def coordinates_of(tree: Tree, configuration: NamedConfiguration) -> Floats:
     """Return q (nq,) of a configuration; what it does not state is neutral.
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model.elements import (
     IDENTITY,
     Actuator,
@@ -28,7 +28,10 @@ from dynx.registry import door
 from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
+    from dynx.model.equalities import StatedEquality
+    from dynx.model.gravity_compensation import StatedGravityCompensation
     from dynx.model.sensors import StatedSensor
+    from dynx.model.tendons import StatedTendon
 
 Base = Literal["fixed", "floating"]
 Part = TypeVar("Part")
@@ -61,7 +64,12 @@ class Tree:
     stated_configurations: tuple[NamedConfiguration, ...] | None = field(default=None, compare=False)
     """Configurations that the description names, by joints; None if its format has none, as URDF and SDF."""
     sensors: tuple[StatedSensor, ...] | None = field(default=None, compare=False)
-    """Sensors of the robot, as data; None for a description that is not MJCF."""
+    """Sensors, fixed tendons, constraints and compensated weights, as data; None but for MJCF."""
+    tendons: tuple[StatedTendon, ...] | None = field(default=None, compare=False)
+    equalities: tuple[StatedEquality, ...] | None = field(default=None, compare=False)
+    gravity_compensation: tuple[StatedGravityCompensation, ...] | None = field(default=None, compare=False)
+    stated_initial: NamedConfiguration | None = field(default=None, compare=False)
+    """Configuration in which the description places the robot, by joints; None for one that is not MJCF."""
 
     def __post_init__(self) -> None:
         if self.floating and self.base_pose != IDENTITY:
@@ -196,6 +204,13 @@ class Tree:
         """Named configurations q (nq,) of the description, such as keyframes of MJCF; read-only arrays."""
         return self._named_configurations()
 
+    @cached_property
+    def initial_configuration(self) -> Floats:
+        """Configuration q (nq,) in which MJCF places the robot (`qpos0`), else the neutral one; read-only."""
+        from dynx.model.named_configurations import initial_configuration  # few flows need it
+
+        return initial_configuration(self)
+
     @door("dynx.model.named_configurations:named_configurations")
     def _named_configurations(self) -> Mapping[str, Floats]:
         raise NotImplementedError
@@ -285,20 +300,9 @@ class Tree:
         try:
             return known[name]
         except (KeyError, TypeError):
-            raise UnknownNameError(self._unknown_name_message(kind, name, known)) from None
+            from dynx.model.unknown_names import unknown_name_message
 
-    def _unknown_name_message(self, kind: str, name: object, known: Mapping[str, object]) -> str:
-        message = f"no {kind} {shown(name)} in {self.name}"
-        if not isinstance(name, str):
-            return f"{message}: a name is a str, not {type(name).__name__}"
-        if kind != "joint" and name in self._joint_by_name:
-            child = self._joint_by_name[name].child
-            return f"{message}: that is a joint; the {kind} it moves is {shown(child)}"
-        if kind == "joint" and name in self._link_by_name:
-            above = [joint.name for joint in self.joints if joint.child == name]
-            moved = f"; the joint that moves it is {shown(above[0])}" if above else ", the root"
-            return f"{message}: that is a link{moved}"
-        return message + nearest(name, known)
+            raise UnknownNameError(unknown_name_message(self, kind, name, known)) from None
 
 
 @dataclass(frozen=True)
@@ -321,6 +325,10 @@ class Description:
     contact_filter: ContactFilter | None = None
     configurations: tuple[NamedConfiguration, ...] | None = None
     sensors: tuple[StatedSensor, ...] | None = None
+    tendons: tuple[StatedTendon, ...] | None = None
+    equalities: tuple[StatedEquality, ...] | None = None
+    gravity_compensation: tuple[StatedGravityCompensation, ...] | None = None
+    initial: NamedConfiguration | None = None
 
 
 def checked_base(base: str) -> Literal["fixed", "floating"]:

@@ -38,6 +38,10 @@ Kind = Literal[
     "contact filter",
     "actuator",
     "sensor",
+    "tendon",
+    "equality",
+    "gravity compensation",
+    "configuration",
     "frame",
     "name",
     "gravity",
@@ -45,12 +49,16 @@ Kind = Literal[
 ]
 
 
+Tag = Literal["joint", "link", "robot", "actuator", "sensor", "tendon", "equality", "configuration"]
+"""Kind of part that differs."""
+
+
 @dataclass(frozen=True)
 class Attribute:
     """A difference beside the verdict, with the values in both descriptions and their lines."""
 
     kind: Kind
-    tag: Literal["joint", "link", "robot", "actuator", "sensor"]
+    tag: Tag
     ours: str | None
     theirs: str | None
     first: str
@@ -63,7 +71,7 @@ class Attribute:
 class DescriptionFreedom:
     """A difference of two descriptions that is none of the robots, in words."""
 
-    kind: Literal["frame", "axis", "order", "links", "inertia", "contacts"]
+    kind: Literal["frame", "axis", "order", "links", "inertia", "contacts", "constraint"]
     ours: str | None
     theirs: str | None
     message: str

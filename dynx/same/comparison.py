@@ -20,6 +20,13 @@ from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.same.attributes import Attribute, DescriptionFreedom, attributes, frame_differences, freedoms
 from dynx.same.bounds import bounds
+from dynx.same.configurations import configuration_differences
+from dynx.same.constraints import (
+    compensation_differences,
+    coupled_as,
+    equality_differences,
+    tendon_differences,
+)
 from dynx.same.contacts import actuator_differences, contact_differences
 from dynx.same.decimals import fifty_digits, rounded
 from dynx.same.effects import ElementEffect, values, values_of_variants
@@ -122,7 +129,7 @@ def same_robot(
         for note in each.model.notes
         if note.message.startswith("not read")
     ]
-    notes += _open_parts(first, second)
+    notes += [*_open_parts(first, second), *_couplings(first, second), *_couplings(second, first)]
     ours, theirs = (without_standing_mimics(each.model) for each in (first, second))
     skeleton = exact_skeleton(ours)
     analysis = analyse(skeleton, theirs, tolerance)
@@ -140,7 +147,14 @@ def same_robot(
         contacts = [*contact_differences(first.model, second.model, analysis.fit, max(tolerance, 1e-15))]
         apart += [each for each in contacts if isinstance(each, Attribute)]
         apart += actuator_differences(first.model, second.model, analysis.fit, max(tolerance, 1e-15))
-        apart += sensor_differences(first.model, second.model, analysis.fit, max(tolerance, 1e-15))
+        both, least = (first.model, second.model, analysis.fit), max(tolerance, 1e-15)
+        apart += sensor_differences(*both, least)
+        apart += tendon_differences(*both, least)
+        constraints = [*equality_differences(*both, least)]
+        apart += [each for each in constraints if isinstance(each, Attribute)]
+        free += [each for each in constraints if isinstance(each, DescriptionFreedom)]
+        apart += compensation_differences(*both, least)
+        apart += configuration_differences(*both, least)
         free += [each for each in contacts if isinstance(each, DescriptionFreedom)]
         free += [*freedoms(analysis.fit, tolerance), *_unseen(analysis)]
         limits = bounds(analysis.fit, _unseen_bodies(analysis)) if same else None
@@ -207,9 +221,32 @@ def _open_parts(first: _Loaded, second: _Loaded) -> Iterator[str]:
             yield f"{other.name} states no actuators; those of {one.name} are not compared"
         if other.model.sensors is None and one.model.sensors:
             yield f"{other.name} states no sensors; those of {one.name} are not compared"
+        for what, field in (
+            ("tendons", "tendons"),
+            ("equality constraints", "equalities"),
+            ("gravity compensation", "gravity_compensation"),
+            ("named configurations", "stated_configurations"),
+        ):
+            if getattr(other.model, field) is None and getattr(one.model, field):
+                yield f"{other.name} states no {what}; what {one.name} states is not compared"
         stated = one.model.contact_filter
         if other.model.contact_filter is None and stated is not None and stated.restricts:
             yield f"{other.name} leaves open which shapes touch; what {one.name} states is not compared"
+
+
+def _couplings(first: _Loaded, second: _Loaded) -> Iterator[str]:
+    """Yield notes on mimic joints of one description that the other couples by an equality constraint."""
+    mimics = {each.name for each in first.model.joints if each.mimic is not None}
+    for equality in second.model.equalities or ():
+        coupling = coupled_as(equality)
+        if coupling is None or coupling[0] not in mimics:
+            continue
+        joint, driver, multiplier, offset = coupling
+        if second.model.joint(joint).mimic is None:
+            yield (
+                f"{second.name} couples joint {joint} by an equality constraint ({multiplier:.9g} * {driver} "
+                f"+ {offset:.9g}), which is data; it is a mimic joint of {first.name}"
+            )
 
 
 # -- what differs -----------------------------------------------------------------------------------

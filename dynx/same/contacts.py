@@ -7,18 +7,21 @@ from dataclasses import dataclass
 from itertools import product
 
 from dynx.model import Model
-from dynx.model.elements import INFINITY, ZERO, Actuator
+from dynx.model.elements import INFINITY, ZERO, Actuator, Joint
 from dynx.model.geometry.links import ContactFilter, ShapeNumber
 from dynx.model.mechanism import ROOT
+from dynx.model.tendons import StatedTendon
 from dynx.same.attributes import (
     Attribute,
     DescriptionFreedom,
+    Tag,
     collision_pairs,
     line_of_link,
     listed,
     number_text,
 )
-from dynx.same.fit import BodyFit, Fit
+from dynx.same.constraints import tendon_pairs
+from dynx.same.fit import Fit
 from dynx.same.limits import differs
 from dynx.same.skeleton import Skeleton
 from dynx.same.text import vector_text
@@ -196,21 +199,28 @@ def actuator_differences(ours: Model, theirs: Model, found: Fit, tolerance: floa
     mine, other = _by_joint(ours.actuators), _by_joint(theirs.actuators)
     for each in found.bodies:
         if each.ours != ROOT:
-            yield from _of_joint(found, each, mine, other, tolerance)
+            ends = found.ours.joints[each.ours], found.theirs.joints[each.theirs]
+            yield from _of_part("joint", *ends, each.sign, mine, other, tolerance)
+    mine, other = _by_tendon(ours.actuators), _by_tendon(theirs.actuators)
+    for tendon, their_tendon in tendon_pairs(ours, theirs, found, tolerance):
+        one, two = tendon or their_tendon, their_tendon or tendon
+        if one is not None and two is not None:
+            yield from _of_part("tendon", one, two, 1, mine, other, tolerance)
 
 
-def _of_joint(
-    found: Fit,
-    each: BodyFit,
+def _of_part(
+    tag: Tag,
+    joint: Joint | StatedTendon,
+    their_joint: Joint | StatedTendon,
+    sign: int,
     mine: dict[str, list[Actuator]],
     other: dict[str, list[Actuator]],
     tolerance: float,
 ) -> Iterator[Attribute]:
-    joint, their_joint = found.ours.joints[each.ours], found.theirs.joints[each.theirs]
     left, alone = list(other.get(their_joint.name, ())), []
     renamed = []
     for actuator in mine.get(joint.name, ()):
-        same = [one for one in left if _are_equal(actuator, one, each.sign, tolerance)]
+        same = [one for one in left if _are_equal(actuator, one, sign, tolerance)]
         same.sort(key=lambda one: one.name != actuator.name)
         if not same:
             alone.append(actuator)
@@ -223,7 +233,7 @@ def _of_joint(
         if first == second:
             second = f"commands and bias of the other sign: {second}"
         lines = alone[0].line if alone else joint.line, left[0].line if left else their_joint.line
-        yield Attribute("actuator", "joint", joint.name, their_joint.name, first, second, *lines)
+        yield Attribute("actuator", tag, joint.name, their_joint.name, first, second, *lines)
     for one, two in renamed:
         names = one.name or "none", two.name or "none"
         yield Attribute("name", "actuator", one.name, two.name, *names, one.line, two.line)
@@ -232,7 +242,16 @@ def _of_joint(
 def _by_joint(actuators: tuple[Actuator, ...]) -> dict[str, list[Actuator]]:
     found: dict[str, list[Actuator]] = {}
     for each in actuators:
-        found.setdefault(each.joint, []).append(each)
+        if not each.tendon:
+            found.setdefault(each.joint, []).append(each)
+    return found
+
+
+def _by_tendon(actuators: tuple[Actuator, ...]) -> dict[str, list[Actuator]]:
+    found: dict[str, list[Actuator]] = {}
+    for each in actuators:
+        if each.tendon:
+            found.setdefault(each.tendon, []).append(each)
     return found
 
 

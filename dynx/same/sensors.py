@@ -15,6 +15,7 @@ from dynx.same.decimals import decimals, rounded
 from dynx.same.fit import Fit, angle_of
 from dynx.same.limits import differs
 from dynx.same.skeleton import Skeleton
+from dynx.same.stated import counterparts, part_differences
 from dynx.spatial.se3 import homogeneous, inverse
 
 
@@ -27,41 +28,12 @@ def sensor_differences(ours: Model, theirs: Model, found: Fit, tolerance: float)
     if ours.sensors is None or theirs.sensors is None:
         return
     objects = _Objects(ours, theirs, found, tolerance)
-    by_name = {each.name: each for each in theirs.sensors if each.name}
-    named = {each.name for each in ours.sensors} & set(by_name)
-    left: dict[tuple[str, str, str], list[StatedSensor]] = {}
-    for each in theirs.sensors:
-        if each.name not in named:
-            left.setdefault(_kind(each), []).append(each)
-    for each in ours.sensors:
-        candidates = left.get(_kind(each), [])
-        other = by_name[each.name] if each.name in named else None
-        if other is None:
-            other = next((one for one in candidates if objects.are_equal(each, one)), None)
-            if other is None:
-                yield _attribute(each, None)
-                continue
-            left[_kind(each)] = [one for one in candidates if one is not other]
-            if other.name != each.name:
-                names = each.name or "none", other.name or "none"
-                yield Attribute("name", "sensor", each.name, other.name, *names, each.line, other.line)
-        elif not objects.are_equal(each, other):
-            yield _attribute(each, other)
-    for one in (each for several in left.values() for each in several):
-        yield _attribute(None, one)
+    pairs = counterparts(ours.sensors, theirs.sensors, objects.are_equal, _kind)
+    yield from part_differences(pairs, "sensor", "sensor", sensor_text, lambda each: each.type)
 
 
 def _kind(sensor: StatedSensor) -> tuple[str, str, str]:
     return sensor.type, sensor.object_type, sensor.reference_type
-
-
-def _attribute(mine: StatedSensor | None, other: StatedSensor | None) -> Attribute:
-    first, second = ("none" if each is None else sensor_text(each) for each in (mine, other))
-    if first == second:
-        second = f"placed otherwise: {second}"
-    names = [None if each is None else each.name or each.type for each in (mine, other)]
-    lines = [None if each is None else each.line for each in (mine, other)]
-    return Attribute("sensor", "sensor", names[0], names[1], first, second, lines[0], lines[1])
 
 
 def sensor_text(sensor: StatedSensor) -> str:

@@ -22,8 +22,9 @@ def assert_same_robot(a: Any, b: Any, *, attributes: Collection[str] = (), **opt
     not change its verdict, but must not occur either: ``"lower limit"``, ``"upper limit"``,
     ``"velocity limit"``, ``"effort limit"``, ``"damping"``, ``"friction"``, ``"armature"``, ``"stiffness"``,
     ``"spring reference"``, ``"collision shapes"``, ``"visual shapes"``, ``"contact filter"``, ``"actuator"``,
-    ``"sensor"``, ``"frame"``, ``"name"``, ``"gravity"`` or ``"base pose"``. Raises AssertionError with a line
-    for each element that differs, UnknownNameError for another kind, and the errors of `dynx.same_robot`.
+    ``"sensor"``, ``"tendon"``, ``"equality"``, ``"gravity compensation"``, ``"configuration"``,
+    ``"frame"``, ``"name"``, ``"gravity"`` or ``"base pose"``. Raises AssertionError with a line for each
+    element that differs, UnknownNameError for another kind, and the errors of `dynx.same_robot`.
     """
     if not is_listed(attributes):
         raise DTypeError(f"attributes is {shown(attributes)}; wanted kinds in a tuple, such as ('damping',)")

@@ -20,6 +20,7 @@ DOORS = {
     "dynx.backends.base:Backend.velocity_ik": "dynx.ik.velocity:velocity_ik",
     "dynx.model.model:Model.order_of": "dynx.loaded.order:order_of",
     "dynx.model.model:Model.with_configuration": "dynx.model.named_configurations:with_configuration",
+    "dynx.model.model:Model._repr_html_": "dynx.model.model_page:model_page",
     "dynx.model.tree:Tree._named_configurations": "dynx.model.named_configurations:named_configurations",
     "dynx.model.model:Model.to_sdf": "dynx.model.sdf.writer:write_sdf",
     "dynx.model.model:Model.to_mjcf": "dynx.model.mjcf.writer:write_mjcf",

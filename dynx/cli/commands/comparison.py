@@ -213,7 +213,8 @@ def same() -> None:
     joints; frames of links, signs of axes and inertia that no state shows make no difference. Where the
     robots differ, the fewest elements of B are listed that make them the same when replaced by those of A.
     Other differences do not change the verdict: limits, joint dynamics, shapes, frames and names, and for two
-    MJCF files contact filters, actuators and sensors, which URDF and SDF leave open.
+    MJCF files contact filters, actuators, sensors, tendons, equality constraints, gravity compensation and
+    keyframes, which URDF and SDF leave open.
 
     Exit code 0 if it is the same robot (or differs only as the baseline allows, or a baseline was written),
     1 if not, mended or not, 2 if A or B cannot be used, or B is to be mended and cannot be.

@@ -1,4 +1,4 @@
-"""Actuators of MJCF that act on one joint, in the terms of `dynx.model.elements.Actuator`.
+"""Actuators of MJCF that act on one joint or tendon, in the terms of `dynx.model.elements.Actuator`.
 
 The shortcuts ``motor``, ``position`` and ``velocity`` are written by MuJoCo as a ``general`` actuator, and
 so they are here. Taken are fixed gains and affine biases without a state of their own.
@@ -6,7 +6,7 @@ so they are here. Taken are fixed gains and affine biases without a state of the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from xml.etree.ElementTree import Element as Written
 from xml.etree.ElementTree import SubElement
 
@@ -21,7 +21,7 @@ Range = tuple[float, float]
 UNBOUNDED: Range = (-INFINITY, INFINITY)
 
 _OF_ALL = frozenset(
-    ["name", "class", "group", "user", "joint", "jointinparent", "gear", "ctrllimited", "ctrlrange"]
+    ["name", "class", "group", "user", "joint", "jointinparent", "tendon", "gear", "ctrllimited", "ctrlrange"]
 ) | {"forcelimited", "forcerange", "lengthrange", "actlimited", "actrange", "actearly"}
 """Attributes that every actuator has, and that are read or act on other actuators alone."""
 
@@ -39,15 +39,16 @@ class NotTakenError(Exception):
 
 
 def read_actuators(
-    document: MjcfText, joints: Mapping[str, Joint]
+    document: MjcfText, joints: Mapping[str, Joint], tendons: Collection[str] = ()
 ) -> tuple[tuple[Actuator, ...], list[tuple[Element, str]]]:
-    """Return the actuators on the joints of a robot, and those that are not taken, each with the reason.
+    """Return the actuators on the joints and tendons of a robot, and those that are not taken, each with the
+    reason.
 
     Raises DescriptionError for an attribute that is malformed.
     """
     taken, left = [], []
     for element in document.sections("actuator"):
-        found = _read(document, element, joints)
+        found = _read(document, element, joints, tendons)
         if isinstance(found, Actuator):
             taken.append(found)
         else:
@@ -55,15 +56,19 @@ def read_actuators(
     return tuple(taken), left
 
 
-def _read(document: MjcfText, element: Element, joints: Mapping[str, Joint]) -> Actuator | str:
+def _read(
+    document: MjcfText, element: Element, joints: Mapping[str, Joint], tendons: Collection[str]
+) -> Actuator | str:
     """Return an actuator, or why it is not taken."""
     try:
-        return _actuator(document, element, joints)
+        return _actuator(document, element, joints, tendons)
     except NotTakenError as reason:
         return str(reason)
 
 
-def _actuator(document: MjcfText, element: Element, joints: Mapping[str, Joint]) -> Actuator:
+def _actuator(
+    document: MjcfText, element: Element, joints: Mapping[str, Joint], tendons: Collection[str]
+) -> Actuator:
     reading, tag = document.reading, element.tag
     if tag not in _OF_ONE:
         raise NotTakenError("is no motor, position, velocity or general")
@@ -73,15 +78,21 @@ def _actuator(document: MjcfText, element: Element, joints: Mapping[str, Joint])
     for name in given:
         if name not in _OF_ALL and name not in _OF_ONE[tag]:
             raise NotTakenError(f"has {escaped(name)}")
-    on = given.get("joint", given.get("jointinparent", ""))
-    if on not in joints or not joints[on].moves or joints[on].type == "ball":
-        raise NotTakenError("acts on no joint of the robot with one coordinate")
+    on, tendon = given.get("joint", given.get("jointinparent", "")), given.get("tendon", "")
+    if tendon and on:
+        raise reading.error(element, f"{what} acts on a joint and a tendon; wanted one of them")
+    if tendon and tendon not in tendons:
+        raise NotTakenError(f"acts on the tendon {shown(tendon)}, which is not read")
+    if not tendon and (on not in joints or not joints[on].moves or joints[on].type == "ball"):
+        raise NotTakenError("acts on no joint of the robot with one coordinate, and on no tendon")
     gain, bias = _terms(document, element, what)
     gear = reading.some_numbers(element, "gear", what, 1, 6)[0] if "gear" in given else 1.0
     ranges = [_range(document, element, name, what) for name in ("ctrl", "force")]
     if reading.number_or(element, "inheritrange", what, 0.0):
+        if tendon:
+            raise NotTakenError("has an inheritrange, and acts on a tendon")
         ranges[0] = _inherited(reading.number(element, "inheritrange", what), joints[on], ranges[0])
-    return Actuator(given.get("name", ""), on, gear, gain, bias, ranges[0], ranges[1], element.line)
+    return Actuator(given.get("name", ""), on, gear, gain, bias, ranges[0], ranges[1], element.line, tendon)
 
 
 def _with_defaults(document: MjcfText, element: Element) -> Element:
@@ -158,7 +169,7 @@ def write_actuators(section: Written, actuators: Iterable[Actuator]) -> None:
     """Add actuators to a section ``<actuator>``."""
     for each in actuators:
         given = {"name": each.name} if each.name else {}
-        given["joint"] = each.joint
+        given |= {"tendon": each.tendon} if each.tendon else {"joint": each.joint}
         if each.gear != 1.0:
             given["gear"] = text(each.gear)
         for name, (low, high) in (("ctrl", each.control_range), ("force", each.force_range)):

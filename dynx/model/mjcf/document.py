@@ -25,8 +25,9 @@ from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_about, rotation_from_quat, rotation_of_z
 
 _ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
-WITH_DEFAULTS = frozenset(["geom", "joint", "site", "mesh", "material"])
-"""Elements that are read and take attributes that they lack from a class of defaults."""
+WITH_DEFAULTS = frozenset(["geom", "joint", "site", "mesh", "material", "equality", "tendon"])
+"""Elements of a class of defaults from which elements that are read take attributes that they lack; those of
+equality and tendon are for all elements of the section."""
 
 ACTUATORS = frozenset(
     ["adhesion", "cylinder", "damper", "dcmotor", "general", "intvelocity", "motor", "muscle"]
@@ -36,11 +37,22 @@ ACTUATORS = frozenset(
 _POSE = frozenset(["pos", *_ORIENTATIONS])
 _NAMED = frozenset(["name", "class", "group", "user"])
 _SOFTNESS = frozenset(["margin", "solimp", "solref"])
+_OF_EQUALITY = frozenset(["active", "solimp", "solref"])
+TENDON_FORCES = frozenset(
+    ["actuatorfrclimited", "actuatorfrcrange", "armature", "damping", "frictionloss", "limited", "range"]
+) | {"springlength", "springyield", "stiffness"}
+"""Attributes of a tendon that are read."""
+TENDON_SOFTNESS = frozenset(["margin", "solimpfriction", "solimplimit", "solreffriction", "solreflimit"])
+"""Attributes of a tendon for MuJoCo's constraint solver."""
+_OF_TENDON = TENDON_FORCES | TENDON_SOFTNESS | {"group", "user"}
 ATTRIBUTES: dict[str, frozenset[str]] = {
     "body": _POSE | {"name", "childclass", "mocap", "gravcomp", "user", "sleep"},
     "frame": _POSE | {"name", "childclass"},
     "key": frozenset(["name", "time", "qpos", "qvel", "act", "ctrl", "mpos", "mquat", "plastic"]),
     "inertial": _POSE | {"mass", "diaginertia", "fullinertia"},
+    "equality": _OF_EQUALITY,
+    "tendon": _OF_TENDON | {"material", "rgba", "width"},
+    "fixed": _OF_TENDON | {"name", "class"},
     "freejoint": frozenset(["name", "group", "align"]),
     "replicate": frozenset(["count", "offset", "euler", "sep", "childclass", "prefix"]),
     "include": frozenset(["file"]),
@@ -209,17 +221,18 @@ class MjcfText:
         for section in self.root.all(tag):
             yield from section.children
 
-    def resolved(self, element: Element, childclass: str | None) -> Element:
+    def resolved(self, element: Element, childclass: str | None, tag: str | None = None) -> Element:
         """Return an element with the attributes that it has from its class of defaults.
 
         That is the class that it names, else the `childclass` of the bodies around it, else the main one.
+        Those of `tag` in the class count, which is by default the tag of the element.
         """
         name = element.attributes.get("class", childclass or self.main_class)
         if name not in self.defaults:
             raise self.reading.error(
                 element, f"no <default> has the class {shown(name)}{nearest(name, self.defaults)}"
             )
-        given = self.defaults[name].get(element.tag, {})
+        given = self.defaults[name].get(tag or element.tag, {})
         if not given:
             return element
         own = element.attributes

@@ -85,6 +85,9 @@ def _document(
 _SECTIONS = ("tendon", "contact", "equality", "actuator", "sensor")
 """Sections whose elements refer to parts of bodies or to elements of sections before them."""
 
+_WITH_CLASSES = ("tendon", "equality", "actuator")
+"""Sections whose elements take attributes from a class of defaults."""
+
 _REFERENCES = {
     "body": ("body", "body1", "body2", "bodyname", "subtree1", "subtree2"),
     "camera": ("camera",),
@@ -159,8 +162,9 @@ class _Copier:
     reading: MjcfReading
     prefix: str
     origin: Origin
-    external: bool
-    """True for elements of another model, whose assets and classes come along under names of their own."""
+    main_class: str | None = None
+    """Main class of defaults of another model, whose assets and classes come along under names of their own;
+    None for elements of the same model."""
 
     def copy(self, element: Element, depth: int = 0) -> Element:
         """Return a copy of an element and of those in it."""
@@ -178,7 +182,11 @@ class _Copier:
         return new
 
     def _is_name(self, attribute: str) -> bool:
-        return attribute == "name" or attribute in _KIND_OF or (self.external and attribute in _OF_ASSETS)
+        return (
+            attribute == "name"
+            or attribute in _KIND_OF
+            or (self.main_class is not None and attribute in _OF_ASSETS)
+        )
 
     def _renamed(self, value: str) -> str:
         if value.startswith(MIMIC):
@@ -300,7 +308,8 @@ class _Attacher:
                     element, f"model {shown(name)} has no {named[0]} {shown(given[named[0]])} to attach"
                 )
             parts, around = [found[0]], found[1] or around
-        copier = _Copier(reading, prefix, Origin(document.compiler, child.source), external=True)
+        origin = Origin(document.compiler, child.source)
+        copier = _Copier(reading, prefix, origin, document.main_class)
         self._bring(element, name, child, copier)
         self._refer(parts, document.root.children, copier)
         return self._frame(element, [copier.copy(part) for part in parts], f"{prefix}{around}")
@@ -325,7 +334,7 @@ class _Attacher:
                 element, f"no {kind} {shown(name)} stands before <attach>{nearest(name, known)}"
             )
         origin = Origin(self._document.compiler, self._around[-1])
-        copier = _Copier(reading, prefix, origin, external=False)
+        copier = _Copier(reading, prefix, origin)
         self._refer([seen.element], self._before, copier)
         return self._frame(element, [copier.copy(seen.element)], seen.childclass or self._document.main_class)
 
@@ -401,6 +410,9 @@ class _Attacher:
                 for each in section.children if section.tag == tag else ():
                     if names.hold(each, least=int(tag != "sensor")):
                         copies.children.append(copier.copy(each))
+                        if copier.main_class is not None and tag in _WITH_CLASSES:
+                            own = f"{copier.prefix}{copier.main_class}"
+                            copies.children[-1].attributes.setdefault("class", own)
                         names.add(each, tag if tag in ("tendon", "actuator") else None)
             if copies.children:
                 self.sections.append(copies)

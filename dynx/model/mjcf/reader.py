@@ -11,7 +11,7 @@ made.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -35,21 +35,26 @@ from dynx.model.elements import (
     Pose,
     Vector,
 )
+from dynx.model.equalities import StatedEquality
 from dynx.model.geometry import Geometry, LinkGeometry
 from dynx.model.geometry.links import ContactFilter
 from dynx.model.geometry.solids import inertial_of
+from dynx.model.gravity_compensation import StatedGravityCompensation
 from dynx.model.mjcf.actuators import read_actuators
 from dynx.model.mjcf.attributes import UNLIMITED
 from dynx.model.mjcf.contacts import read_contacts
 from dynx.model.mjcf.document import MjcfText, turn
+from dynx.model.mjcf.equalities import EqualityObjects, is_mimic, read_equalities
 from dynx.model.mjcf.expansion import read_document
-from dynx.model.mjcf.extension import MIMIC, Extension
+from dynx.model.mjcf.extension import Extension
 from dynx.model.mjcf.keyframes import NOT_OF_A_POSITION, TreeCoordinates, read_keyframes, tree_states
 from dynx.model.mjcf.sensor_objects import SensorObjects
 from dynx.model.mjcf.sensors import read_sensors, require_objects
 from dynx.model.mjcf.shapes import Geom, GeomReader
+from dynx.model.mjcf.tendons import read_tendons
 from dynx.model.package_search import StrPath
 from dynx.model.sensors import StatedSensor
+from dynx.model.tendons import StatedTendon
 from dynx.model.topology import MAX_LINKS
 from dynx.model.tree import Base, Description
 from dynx.model.urdf.reader import inertia_fault
@@ -98,7 +103,7 @@ _NOT_IN_TREE = {
 }
 _OF_SCENES = ("equality", "contact", "keyframe")
 """Sections that a scene reads."""
-_OF_ONE_ROBOT = ("actuator", "contact", "keyframe", "sensor")
+_OF_ONE_ROBOT = ("actuator", "contact", "equality", "keyframe", "sensor", "tendon")
 """Sections that are read of one robot, as data."""
 _IN_ROOT = frozenset(
     ["compiler", "option", "size", "statistic", "visual", "default", "asset", "worldbody", "custom"]
@@ -243,6 +248,8 @@ class _TreeReader:
         self._taken = _names(document.root, "body")
         self._joint_names = _names(document.root, "joint")
         self._bodies_read: set[str] = set()
+        self._spring_references: dict[str, float] = {}
+        self._compensation: list[StatedGravityCompensation] = []
         self._joints_read: set[str] = set()
 
     def read(self) -> Description:
@@ -256,17 +263,22 @@ class _TreeReader:
         self._read_mimics()
         self._require_joints_of_motors(root)
         self._scale(self._total_mass_scale(root, self._parts.links))
-        actuators, contact_filter = self._read_actuators(), self._contact_filter()
+        tendons = self._read_tendons()
+        actuators, contact_filter = self._read_actuators(tendons), self._contact_filter()
         configurations = self._read_configurations(base)
+        self._note_compensation()
         self._note_counts(root)
         self._document.options.note(self._reading, scene=False)
         content = self._description(name, base, self._document.options.gravity, self._reading.notes)
+        content = replace(content, actuators=actuators, tendons=tendons)
         return replace(
             content,
-            actuators=actuators,
             contact_filter=contact_filter,
             configurations=configurations,
             sensors=self._read_sensors(content),
+            equalities=self._read_equalities(tendons, content.frames),
+            gravity_compensation=tuple(self._compensation),
+            initial=self._initial_configuration(base),
         )
 
     def read_trees(self) -> MjcfTrees:
@@ -527,6 +539,9 @@ class _TreeReader:
         self._colliding[body.name] = [geom for geom in body.geoms if geom.collides]
         self._link_of[body.element.attributes.get("name", "")] = body.name
         self._add_sites(body)
+        factor = self._reading.number_or(body.element, "gravcomp", f"body {shown(body.name)}", 0.0)
+        if factor:
+            self._compensation.append(StatedGravityCompensation(body.name, factor, body.element.line))
         for attribute in _NOT_READ_OF_BODIES:
             if body.element.attributes.get(attribute, "0") not in ("0", "false"):
                 self._held.setdefault(attribute, []).append((f"body {shown(body.name)}", body.element))
@@ -601,7 +616,7 @@ class _TreeReader:
                     Pose.from_matrix(origin),
                     axis=(x, y, z),
                     limits=limits,
-                    dynamics=self._dynamics(element, kind, what),
+                    dynamics=self._dynamics(element, name, kind),
                     line=element.line,
                 )
             )
@@ -701,22 +716,24 @@ class _TreeReader:
 
     def _read_mimics(self) -> None:
         """Let joints follow others where dynx wrote the equality constraint that couples them."""
-        reading, mimics = self._reading, dict[str, Mimic]()
+        reading, mimics, references = self._reading, dict[str, Mimic](), dict(self._parts.positions)
         if self._document.options.disabled("equality") is not None:
             return
         for element in self._document.sections("equality"):
-            if not _couples_mimic(element):
+            if not is_mimic(element):
                 continue
             what = f"equality {shown(element.attributes['name'])}"
             joint, driver = (reading.name(element, f"joint{k}", what) for k in (1, 2))
-            offset, multiplier, *rest = reading.numbers(element, "polycoef", what, 5)
+            constant, multiplier, *rest = reading.numbers(element, "polycoef", what, 5)
             known = [each.name for each in self._parts.joints]
             for name in (joint, driver):
                 if name not in known:
                     raise reading.error(element, f"{what} couples {shown(name)}{nearest(name, known)}")
             if any(rest):
                 raise reading.error(element, f"{what} has a polynomial; wanted polycoef with three zeros")
-            mimics[joint] = Mimic(driver, multiplier, offset)
+            # Positions are relative to those in the pose of the file.
+            shift = references.get(joint, 0.0) - multiplier * references.get(driver, 0.0)
+            mimics[joint] = Mimic(driver, multiplier, constant + shift if shift else constant)
         self._parts.joints = [replace(each, mimic=mimics.get(each.name)) for each in self._parts.joints]
 
     def _require_joints_of_motors(self, root: Element) -> None:
@@ -734,25 +751,76 @@ class _TreeReader:
                         f"{nearest(name, known)}",
                     )
 
-    def _read_actuators(self) -> tuple[Actuator, ...]:
+    def _read_actuators(self, tendons: Iterable[StatedTendon]) -> tuple[Actuator, ...]:
         """Return the actuators of the robot, with notes on all of them: none acts."""
-        taken, left = read_actuators(self._document, {each.name: each for each in self._parts.joints})
-        if taken:
+        joints = {each.name: each for each in self._parts.joints}
+        taken, left = read_actuators(self._document, joints, {each.name for each in tendons if each.name})
+        self._note_data("actuator", "none acts on a robot in dynx", taken, left, _NOT_IN_TREE["actuator"])
+        return taken
+
+    def _read_tendons(self) -> tuple[StatedTendon, ...]:
+        """Return the fixed tendons of the robot, with notes on all of them: none pulls."""
+        joints = {each.name: each for each in self._parts.joints}
+        taken, left = read_tendons(self._document, joints, self._spring_references)
+        self._note_data("tendon", "no tendon pulls in dynx", taken, left)
+        return taken
+
+    def _read_equalities(
+        self, tendons: Iterable[StatedTendon], frames: Iterable[Frame]
+    ) -> tuple[StatedEquality, ...]:
+        """Return the equality constraints of the robot, with notes on all of them: none acts."""
+        if self._document.options.disabled("equality") is not None:
+            return ()
+        joints = {each.name: each for each in self._parts.joints}
+        positions = {name: start for name, start in self._parts.positions if joints[name].type != "ball"}
+        sites = (each.name for each in self._parts.sites)
+        parts = EqualityObjects(
+            self._link_of,
+            dict(zip(sites, (each.name for each in frames), strict=True)),
+            positions,
+            {each.name: sum(factor * positions[joint] for joint, factor in each.terms) for each in tendons},
+            self._poses,
+        )
+        taken, left = read_equalities(self._document, parts, joints.keys() - positions.keys())
+        self._note_data("equality", _NOT_IN_TREE["equality"], taken, left)
+        return taken
+
+    def _initial_configuration(self, base: Base) -> NamedConfiguration:
+        """Return `qpos0`."""
+        (state,) = tree_states(self._document, [self._coordinates(base)])
+        return state.configuration("")
+
+    def _note_compensation(self) -> None:
+        self._held.pop("gravcomp", None)
+        if self._compensation:
+            first = self._compensation[0]
+            more = f" and of {_counted(len(self._compensation) - 1, 'other body')}"
             self._reading.notes.append(
                 Note(
-                    f"{_counted(len(taken), 'element')} of <actuator>: model.actuators has them as data, "
-                    "and none acts on a robot in dynx",
-                    taken[0].line,
+                    f"gravcomp of body {shown(first.link)}{more if len(self._compensation) > 1 else ''}: "
+                    "model.gravity_compensation has it as data, and weight is not compensated in dynx",
+                    first.line,
                 )
             )
+
+    def _note_data(
+        self,
+        tag: str,
+        effect: str,
+        taken: Sequence[Actuator | StatedTendon | StatedEquality],
+        left: Sequence[tuple[Element, str]],
+        effect_of_left: str | None = None,
+    ) -> None:
+        """Add notes on the elements of a section that the model has as data, and on those left out."""
+        held = {"actuator": "actuators", "tendon": "tendons", "equality": "equalities"}[tag]
+        if taken:
+            count = _counted(len(taken), "element")
+            text = f"{count} of <{tag}>: model.{held} has them as data, and {effect}"
+            self._reading.notes.append(Note(text, taken[0].line))
         if left:
-            element, reason = left[0]
-            self._reading.note(
-                element,
-                f"not read: {_counted(len(left), 'element')} of <actuator>; {_NOT_IN_TREE['actuator']} "
-                f"(the first is left out because {reason})",
-            )
-        return taken
+            (element, reason), count = left[0], _counted(len(left), "element")
+            text = f"not read: {count} of <{tag}>; {effect_of_left or effect}"
+            self._reading.note(element, f"{text} (the first is left out because {reason})")
 
     def _read_sensors(self, content: Description) -> tuple[StatedSensor, ...]:
         """Return the sensors of the robot, with a note on those that are left out."""
@@ -771,7 +839,6 @@ class _TreeReader:
     def _read_configurations(self, base: Base) -> tuple[NamedConfiguration, ...]:
         """Return the keyframes of the robot, with a note on what they state besides its positions."""
         keyframes, parts = read_keyframes(self._document), self._parts
-        T_world_free = parts.bodies[0].T_world_body if base == "floating" else None
         if keyframes and parts.aligned:
             self._reading.note(
                 next(iter(keyframes.values())),
@@ -779,8 +846,7 @@ class _TreeReader:
                 "principal axes",
             )
             return ()
-        coordinates = _coordinates(T_world_free, parts.positions, parts.joints)
-        found = []
+        coordinates, found = self._coordinates(base), []
         for name, key in keyframes.items():
             (state,) = tree_states(self._document, [coordinates], key, name)
             found.append(state.configuration(name, key.line))
@@ -795,6 +861,11 @@ class _TreeReader:
             )
         return tuple(found)
 
+    def _coordinates(self, base: Base) -> TreeCoordinates:
+        parts = self._parts
+        T_world_free = parts.bodies[0].T_world_body if base == "floating" else None
+        return _coordinates(T_world_free, parts.positions, parts.joints)
+
     def _contact_filter(self) -> ContactFilter:
         """Return which shapes may touch, with a note on what is no part of the robot."""
         found, left = self._contacts.of_robot(self._link_of, self._colliding)
@@ -808,8 +879,8 @@ class _TreeReader:
             self._reading.note(self._contacts.parameters, "parameters of <pair> are not read")
         return found
 
-    def _dynamics(self, element: Element, kind: str, what: str) -> JointDynamics:
-        reading, given = self._reading, element.attributes
+    def _dynamics(self, element: Element, name: str, kind: str) -> JointDynamics:
+        reading, given, what = self._reading, element.attributes, f"joint {shown(name)}"
         coefficients = {}
         for attribute in ("damping", "stiffness"):
             numbers = reading.some_numbers(element, attribute, what, 1, 3) if attribute in given else (0.0,)
@@ -831,14 +902,15 @@ class _TreeReader:
         if stiffness and reading.number_or(element, "springyield", what, 0.0):
             reading.note(element, f"springyield of {what} is not read: its spring is elastic")
         friction = reading.number_or(element, "frictionloss", what, 0.0)
-        for name, value in (("damping", coefficients["damping"]), ("frictionloss", friction)):
+        for loss, value in (("damping", coefficients["damping"]), ("frictionloss", friction)):
             if value < 0.0:
-                reading.note(element, f"the {name} of {what} is negative, so the joint gains energy")
+                reading.note(element, f"the {loss} of {what} is negative, so the joint gains energy")
         if stiffness < 0.0:
             reading.note(element, f"the stiffness of {what} is negative, so the spring pushes the joint away")
+        reference = self._spring_references[name] = self._position(element, "springref", kind, what)
         return JointDynamics(
             stiffness=stiffness,
-            spring_reference=self._position(element, "springref", kind, what),
+            spring_reference=reference,
             damping=coefficients["damping"] if options.disabled("damper") is None else 0.0,
             friction=friction if options.disabled("frictionloss") is None else 0.0,
             armature=reading.number_or(element, "armature", what, 0.0),
@@ -952,9 +1024,7 @@ class _TreeReader:
     def _note_sections(self, root: Element, not_read: Mapping[str, str]) -> None:
         reading = self._reading
         for tag, effect in not_read.items():
-            elements = [
-                each for section in root.all(tag) for each in section.children if not _couples_mimic(each)
-            ]
+            elements = [each for section in root.all(tag) for each in section.children if not is_mimic(each)]
             if elements:
                 reading.note(
                     elements[0], f"not read: {_counted(len(elements), 'element')} of <{tag}>; {effect}"
@@ -978,11 +1048,6 @@ def _coordinates(
         T_world_free,
         tuple((name, (0.0, 0.0, 0.0, 1.0) if name in balls else (start,)) for name, start in positions),
     )
-
-
-def _couples_mimic(element: Element) -> bool:
-    """Check whether an element is an equality constraint of a mimic joint, written by dynx."""
-    return element.tag == "joint" and element.attributes.get("name", "").startswith(MIMIC)
 
 
 def _counted(count: int, noun: str) -> str:

@@ -27,6 +27,7 @@ class SensorObjects:
         moving = [each for each in robot.joints if each.moves]
         known = {each.name for each in moving}
         bodies = {WORLD, *(each.name for each in robot.links)}
+        tendons = {each.name for each in robot.tendons or () if each.name and known.issuperset(each.joints)}
         return cls(
             {
                 "site": {each.name for each in frames},
@@ -36,7 +37,12 @@ class SensorObjects:
                 "joint": {each.name for each in moving if each.type != "ball"},
                 "ball joint": {each.name for each in moving if each.type == "ball"},
                 "joint with a range": {each.name for each in moving if _has_range(each)},
-                "actuator": {each.name for each in robot.actuators or () if each.joint in known},
+                "tendon": set(tendons),
+                "actuator": {
+                    each.name
+                    for each in robot.actuators or ()
+                    if each.joint in known or (each.tendon and each.tendon in tendons)
+                },
             }
         )
 

@@ -108,7 +108,7 @@ def _sensors(document: MjcfText) -> Iterator[tuple[Element, StatedSensor | None,
     elements = list(document.sections("sensor"))
     if not elements:
         return
-    known, names, reading = _names_by_kind(document), set[str](), document.reading
+    known, names, reading = names_by_kind(document), set[str](), document.reading
     for element in elements:
         tag, name = element.tag, element.attributes.get("name", "")
         if tag not in _SLOTS and tag not in _NOT_TAKEN:
@@ -185,8 +185,8 @@ def _kind_attribute(attribute: str) -> str:
     return attribute.replace("name", "type")
 
 
-def _names_by_kind(document: MjcfText) -> dict[str, set[str]]:
-    """Return the names of what a sensor may sense, wherever in the file it is."""
+def names_by_kind(document: MjcfText) -> dict[str, set[str]]:
+    """Return the names of what sensors, tendons and constraints may refer to, wherever in the file it is."""
     found: dict[str, set[str]] = {
         kind: set() for kind in ("body", "joint", "geom", "site", "camera", "tendon", "actuator")
     }

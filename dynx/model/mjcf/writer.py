@@ -21,7 +21,7 @@ import numpy as np
 
 from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, UnsupportedFeatureError, shown
-from dynx.model.elements import IDENTITY, ZERO, Inertial, Joint, Limits, Link, Mimic, Pose
+from dynx.model.elements import IDENTITY, ZERO, Actuator, Inertial, Joint, Limits, Link, Mimic, Pose
 from dynx.model.geometry import (
     Appearance,
     Collision,
@@ -46,9 +46,12 @@ from dynx.model.mjcf.attributes import (
     primitive_attributes,
     text,
 )
+from dynx.model.mjcf.document import turn
+from dynx.model.mjcf.equalities import EqualityWriter
 from dynx.model.mjcf.extension import MIMIC, Extension
 from dynx.model.mjcf.sensor_objects import SensorObjects
 from dynx.model.mjcf.sensors import write_sensors
+from dynx.model.mjcf.tendons import write_tendons
 from dynx.model.tree import Tree
 from dynx.model.urdf.reader import inertia_fault
 from dynx.model.urdf.writer import listed, note_of_kind
@@ -56,6 +59,7 @@ from dynx.model.xml.reading import MAX_DEPTH as MAX_ELEMENT_DEPTH
 from dynx.model.xml.several_files import free_name
 from dynx.model.xml.values import name_fault
 from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
 
 WORLD = "world"
 """MJCF's name of the body that does not move."""
@@ -70,6 +74,9 @@ MESH_SUFFIXES = (".obj", ".stl", ".msh")
 """Formats of meshes that MuJoCo reads."""
 
 _AT_ORIGIN = {"pos": (0.0, 0.0, 0.0), "quat": (1.0, 0.0, 0.0, 0.0)}
+_ROUNDING = 1e-15
+"""Largest entry of a rotation that is none but for rounding."""
+
 _SITE_SIZE = 0.005
 """Radius [m] with which viewers show a frame."""
 
@@ -128,21 +135,21 @@ class RobotWriter:
         self._add_defaults()
         self._kinds: dict[str, list[str]] = {}
         self._assets = _Assets(SubElement(root, "asset"), mesh_path, image_path, self.notes, self._kinds)
+        self._set_initial_pose()
         self._add_bodies(SubElement(root, "worldbody"))
         self._add_contacts(SubElement(root, "contact"))
         self._equality, self._actuator = SubElement(root, "equality"), SubElement(root, "actuator")
         for joint in tree.joints:
             if joint.moves and joint.mimic is not None:
                 self._couple(joint)
+        self._parts = SensorObjects.of(tree, self._geom_names)
+        self._add_tendons(SubElement(root, "tendon"))
+        self._add_equalities()
         if tree.actuators is None:
             for joint in tree.coordinate_joints:
                 self._add_motor(joint)
         else:
-            moving = {joint.name for joint in tree.joints if joint.moves}
-            write_actuators(self._actuator, [each for each in tree.actuators if each.joint in moving])
-            for each in tree.actuators:
-                if each.joint not in moving:
-                    _add(self._kinds, "Actuators on joints that do not move are left out", each.joint)
+            self._add_actuators(tree.actuators)
         self._add_sensors(SubElement(root, "sensor"))
         self._add_keyframes(SubElement(root, "keyframe"))
         self._extension.write(root)
@@ -157,6 +164,49 @@ class RobotWriter:
         return document_text(self._root, self.notes)
 
     # -- the tree -------------------------------------------------------------------------------
+
+    def _set_initial_pose(self) -> None:
+        """Choose the pose of the document, in which MuJoCo starts: that of the description.
+
+        Joints of couplings are at 0, because the reader would round the coupling otherwise.
+        """
+        tree, stated = self._tree, self._tree.stated_initial
+        self._base_pose = tree.base_pose
+        self._references: dict[str, float] = {}
+        if stated is None:
+            return
+        q = tree.initial_configuration
+        if tree.floating:
+            self._base_pose = Pose.from_matrix((q[:3], q[3:7]))
+        coupled = {
+            name
+            for joint in tree.joints
+            if joint.moves and joint.mimic is not None
+            for name in (joint.name, joint.mimic.joint)
+        }
+        for joint in tree.coordinate_joints:
+            position = 0.0 if joint.type == "ball" else float(q[tree.position_index(joint.name)])
+            if position and joint.name in coupled:
+                kind = "Joints of couplings are at 0 where MuJoCo starts"
+                _add(self._kinds, kind, joint.name)
+            elif position:
+                self._references[joint.name] = position
+
+    def _placement(self, joint: Joint) -> Pose:
+        """Return the pose of the child of a joint in its parent, in the pose of the document."""
+        position = self._references.get(joint.name, 0.0)
+        if not position:
+            return joint.origin
+        axis = np.array(joint.axis)
+        if joint.type == "prismatic":
+            motion = homogeneous(np.eye(3), position * axis)
+        else:
+            motion = homogeneous(turn(axis, position), np.zeros(3))
+        T = joint.origin.matrix @ motion
+        off = np.abs(T[:3, :3] - np.eye(3)).max()
+        if off <= _ROUNDING:
+            T[:3, :3] = np.eye(3)
+        return Pose.from_matrix(T)
 
     def _add_defaults(self) -> None:
         default = SubElement(self._root, "default")
@@ -175,6 +225,7 @@ class RobotWriter:
         for frame in tree.extra_frames:
             frames.setdefault(frame.link, []).append(frame)
         self._geom_names: set[str] = set()
+        compensation = {each.link: each.factor for each in tree.gravity_compensation or ()}
         self._carried = self._links_between_joints(frames)
         # Links are in depth-first order, so that the body of the parent is there, and children keep theirs.
         for link in tree.links:
@@ -197,10 +248,15 @@ class RobotWriter:
                 chain = [joint]
                 while chain[0].parent in self._carried:
                     chain.insert(0, above[chain[0].parent])
-                self._add_joints(_body(bodies[joint.parent], link.name, _end(chain)), chain, link)
+                self._add_joints(_body(bodies[joint.parent], link.name, self._end(chain)), chain, link)
                 body = bodies[joint.parent][-1]
             bodies[link.name] = body
             self._body_names[link.name] = WORLD if body is world else body.attrib["name"]
+            if link.name in compensation:
+                if body is world:
+                    _add(self._kinds, "MuJoCo compensates no gravity of the world", link.name)
+                else:
+                    body.set("gravcomp", text(compensation[link.name]))
             if body is not world and link.inertial is not None:
                 SubElement(body, "inertial", inertial_attributes(link.inertial))
             self._add_shapes(body, link)
@@ -219,7 +275,7 @@ class RobotWriter:
             name = free_name(f"{WORLD}_link", {link.name for link in tree.links})
             self._extension.texts["name"][""] = WORLD
             self._note_names("The root link has another name", [WORLD], "dynx reads its own in <custom>")
-        body = _body(world, name, tree.base_pose)
+        body = _body(world, name, self._base_pose)
         if not tree.floating or name != root.name:
             self._extension.texts["root"][""] = name
         if tree.floating:
@@ -238,6 +294,9 @@ class RobotWriter:
         for joint in tree.joints:
             below.setdefault(joint.parent, []).append(joint)
         sensed = {name for each in tree.sensors or () for kind, name in each.objects if "body" in kind}
+        sensed |= {
+            name for each in tree.equalities or () if each.object_type == "xbody" for name in each.objects
+        }
         row: dict[str, int] = {}
         for joint in tree.joints:
             link, next_ones = tree.link(joint.child), below.get(joint.child, [])
@@ -247,7 +306,7 @@ class RobotWriter:
                 joint.moves
                 and joint.type != "ball"
                 and link.inertial in (None, Inertial())
-                and [each.moves and each.origin.rpy == ZERO for each in next_ones] == [True]
+                and [each.moves and self._placement(each).rpy == ZERO for each in next_ones] == [True]
                 and shapes == LinkGeometry()
                 and not (shapes.visual_fault or shapes.collision_fault)
                 and link.name not in frames
@@ -266,9 +325,22 @@ class RobotWriter:
                 continue
             if joint.child != f"{joint.name}_link":
                 self._extension.texts["link"][joint.name] = _checked_name(joint.child)
-            point = -sum((np.array(each.origin.xyz) for each in chain[number + 1 :]), np.zeros(3)) + 0.0
+            point = -self._offset(chain[number + 1 :]) + 0.0
             if point.any():
                 body[-1].set("pos", text(point))
+
+    def _offset(self, chain: Iterable[Joint]) -> Floats:
+        """Return the sum (3,) of the offsets of joints that follow one another without a rotation [m]."""
+        return sum((np.array(self._placement(each).xyz) for each in chain), np.zeros(3))
+
+    def _end(self, chain: Sequence[Joint]) -> Pose:
+        """Return the pose of the last link of a chain in the link that carries it."""
+        first = self._placement(chain[0])
+        if len(chain) == 1:
+            return first
+        T = first.matrix
+        x, y, z = (T[:3, 3] + T[:3, :3] @ self._offset(chain[1:])).tolist()
+        return Pose((x, y, z), first.rpy)
 
     def _add_joint(self, body: Element, joint: Joint, link: Link) -> None:
         if not joint.moves:
@@ -298,6 +370,8 @@ class RobotWriter:
             self._extension.numbers["effort"][joint.name] = limits.effort
         if limits.velocity != Limits().velocity:
             self._extension.numbers["velocity"][joint.name] = limits.velocity
+        if joint.name in self._references:
+            given["ref"] = text(self._references[joint.name])
         SubElement(body, "joint", {"name": _checked_name(joint.name)} | given)
 
     def _couple(self, joint: Joint) -> None:
@@ -314,13 +388,66 @@ class RobotWriter:
             given = {"ctrlrange": text((-effort, effort))} if effort < UNLIMITED else {}
             SubElement(self._actuator, "motor", {"name": joint.name, "joint": joint.name} | given)
 
+    def _add_actuators(self, actuators: Iterable[Actuator]) -> None:
+        """Add the actuators whose joint or tendon is in the document."""
+        moving = {joint.name for joint in self._tree.joints if joint.moves}
+        written = []
+        for each in actuators:
+            if each.joint in moving or each.tendon in self._parts.names["tendon"]:
+                written.append(each)
+            elif each.tendon:
+                _add(self._kinds, "Actuators on tendons that are left out", each.name or each.tendon)
+            else:
+                _add(self._kinds, "Actuators on joints that do not move are left out", each.joint)
+        write_actuators(self._actuator, written)
+
+    def _add_tendons(self, section: Element) -> None:
+        """Add the tendons all of whose joints move."""
+        moving = {joint.name for joint in self._tree.joints if joint.moves}
+        written = []
+        for each in self._tree.tendons or ():
+            if moving.issuperset(each.joints):
+                written.append(each)
+            else:
+                kind = "Tendons of joints that do not move are left out"
+                _add(self._kinds, kind, each.name or each.joints[0])
+        write_tendons(section, written)
+
+    def _add_equalities(self) -> None:
+        """Add the equality constraints whose objects are in the document, and that its pose fulfils."""
+        tree = self._tree
+        tendons = {each.name: each for each in tree.tendons or ()}
+
+        def reference(kind: str, name: str) -> float:
+            terms = ((name, 1.0),) if kind == "joint" else tendons[name].terms
+            return sum(factor * self._references.get(joint, 0.0) for joint, factor in terms)
+
+        writer = EqualityWriter(self._body_names, self._poses(), reference)
+        for each in tree.equalities or ():
+            kind = each.object_type
+            missing = [name for name in each.objects if name not in self._parts.names[kind]]
+            if missing:
+                what = (
+                    f"Equality constraints of a {kind.removeprefix('x')} that the document lacks are left out"
+                )
+                _add(self._kinds, what, each.name or missing[0])
+            elif not writer.write(self._equality, each):
+                what = "Equality constraints that the pose of the document contradicts are left out"
+                _add(self._kinds, what, each.name or each.first)
+
+    def _poses(self) -> dict[str, Floats]:
+        """Return the poses (4, 4) of the links in the world, in the pose of the document."""
+        tree = self._tree
+        poses = {WORLD: np.eye(4), tree.root: self._base_pose.matrix}
+        for joint in tree.joints:
+            poses[joint.child] = poses[joint.parent] @ self._placement(joint).matrix
+        return poses
+
     def _add_sensors(self, section: Element) -> None:
         """Add the sensors whose objects are in the document."""
-        tree = self._tree
-        parts = SensorObjects.of(tree, self._geom_names)
-        written = []
+        tree, written = self._tree, []
         for each in tree.sensors or ():
-            missing = parts.missing(each)
+            missing = self._parts.missing(each)
             if missing is None:
                 written.append(each)
             else:
@@ -588,17 +715,6 @@ def inertial_attributes(inertial: Inertial) -> dict[str, str]:
     if (np.eye(3) != R).any():
         tensor = R @ tensor @ R.T
     return given | {"fullinertia": text([*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]])}
-
-
-def _end(chain: Sequence[Joint]) -> Pose:
-    """Return the pose of the last link of a chain, at position 0, in the link that carries it."""
-    origin = chain[0].origin
-    if len(chain) == 1:
-        return origin
-    T = origin.matrix
-    offset = sum((np.array(each.origin.xyz) for each in chain[1:]), np.zeros(3))
-    x, y, z = (T[:3, 3] + T[:3, :3] @ offset).tolist()
-    return Pose((x, y, z), origin.rpy)
 
 
 def _refused_inertias(tree: Tree, carried_links: Collection[str]) -> dict[str, list[str]]:

@@ -223,10 +223,23 @@ def urdf_notes(tree: Tree) -> Iterator[str]:
 
 
 def notes_of_open_parts(tree: Tree, language: str) -> Iterator[str]:
-    """Yield notes on actuators, sensors, contacts and configurations, which a format leaves open."""
+    """Yield notes on actuators, sensors, contacts, configurations, tendons, constraints and gravity
+    compensation, which a format leaves open."""
     if tree.actuators:
-        joints = dict.fromkeys(each.joint for each in tree.actuators)
+        joints = dict.fromkeys(each.joint or each.tendon for each in tree.actuators)
         yield f"{language} has no actuators of a robot; those of some joints are left out ({listed(joints)})."
+    if tree.tendons:
+        names = listed(each.name or each.joints[0] for each in tree.tendons)
+        yield f"{language} has no tendons; those of the robot are left out ({names})."
+    if tree.equalities:
+        names = listed(each.name or each.first for each in tree.equalities)
+        yield (
+            f"{language} has no equality constraints as MJCF has them; those of the robot are left out, so "
+            f"that loops stay open and joints that they couple move freely ({names})."
+        )
+    if tree.gravity_compensation:
+        names = listed(each.link for each in tree.gravity_compensation)
+        yield f"{language} has no gravity compensation; that of some links is left out ({names})."
     if tree.sensors:
         names = listed(each.name or each.type for each in tree.sensors)
         yield f"{language} has no sensors as MJCF has them; those of the robot are left out ({names})."

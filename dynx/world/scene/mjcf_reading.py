@@ -314,7 +314,7 @@ class _SceneReader:
             self._reading.note(flag, "equality constraints are disabled, and none is read")
             return
         for element in self._document.sections("equality"):
-            resolved = self._document.resolved(element, None)
+            resolved = self._document.resolved(element, None, "equality")
             if resolved.attributes.get("active", "true") == "false":
                 self._reading.note(element, f"<{element.tag}> of <equality> is not active, and is not read")
             else:

@@ -487,7 +487,7 @@ def test_what_is_not_part_of_the_model_is_named() -> None:
     text = ARM.replace(
         "</worldbody>",
         '</worldbody><actuator><motor joint="hinge"/></actuator><sensor><user dim="1"/></sensor>'
-        '<equality><weld body1="link"/></equality><tendon><fixed/></tendon>'
+        '<equality><weld body1="link"/><flex flex="f"/></equality><tendon><spatial/></tendon>'
         '<keyframe><key act="1"/></keyframe><contact><exclude body1="a" body2="b"/></contact>',
     ).replace('axis="0 1 0"', 'axis="0 1 0" stiffness="3 1" springref="0.1"')
     text = text.replace("<worldbody>", '<option viscosity="1"/><worldbody>').replace(
@@ -496,6 +496,7 @@ def test_what_is_not_part_of_the_model_is_named() -> None:
     notes = "\n".join(map(str, dynx.load(text).notes))
     for word in ("<sensor>", "<equality>", "<tendon>", "<contact>"):
         assert f"not read: 1 element of {word}" in notes
+    assert "1 element of <equality>: model.equalities has them as data" in notes
     assert "not read of <keyframe>: act" in notes
     assert "1 element of <actuator>: model.actuators has them as data" in notes
     for word in ("stiffness of joint 'hinge' is a polynomial", "viscosity", "gravcomp", "polynomial"):

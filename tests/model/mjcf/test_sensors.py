@@ -206,7 +206,7 @@ PARTS = {
     "camera": ["eye"],
     "none": ["none"],
 }
-NOT_WRITTEN = {"cable", "eye", "pull"}
+NOT_WRITTEN = {"eye", "pull"}
 
 
 @given(st.tuples(*(sensor_elements(PARTS, f"n{k}") for k in range(4))))

@@ -1,0 +1,279 @@
+"""Tendons, equality constraints and gravity compensation of two robots, as their descriptions state them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from dynx.model import Model
+from dynx.model.elements import INFINITY
+from dynx.model.equalities import LINEAR, StatedEquality
+from dynx.model.mechanism import ROOT
+from dynx.model.tendons import StatedTendon
+from dynx.same.attributes import Attribute, DescriptionFreedom, number_text
+from dynx.same.decimals import decimals, rounded
+from dynx.same.fit import BodyFit, Fit, angle_of
+from dynx.same.limits import differs
+from dynx.same.places import PlaceInBody, Places
+from dynx.same.stated import counterparts, part_differences
+from dynx.same.text import vector_text
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.se3 import inverse
+
+UNBOUNDED = (-INFINITY, INFINITY)
+
+
+# -- tendons ----------------------------------------------------------------------------------------------
+
+
+def tendon_pairs(
+    ours: Model, theirs: Model, found: Fit, tolerance: float
+) -> Iterator[tuple[StatedTendon | None, StatedTendon | None]]:
+    """Yield the tendons that correspond, by their names or because they are equal; None for one alone."""
+    for mine, other, _ in _compared_tendons(ours, theirs, found, tolerance):
+        yield mine, other
+
+
+def tendon_differences(ours: Model, theirs: Model, found: Fit, tolerance: float) -> Iterator[Attribute]:
+    """Yield the tendons that differ, that one description has alone, or that have other names; nothing where
+    a description leaves tendons open. Coefficients have the signs of the joints' positions."""
+    pairs = _compared_tendons(ours, theirs, found, tolerance)
+    yield from part_differences(pairs, "tendon", "tendon", tendon_text, lambda each: each.joints[0])
+
+
+def _compared_tendons(
+    ours: Model, theirs: Model, found: Fit, tolerance: float
+) -> Iterator[tuple[StatedTendon | None, StatedTendon | None, bool]]:
+    if ours.tendons is None or theirs.tendons is None:
+        return iter(())
+
+    def are_equal(mine: StatedTendon, other: StatedTendon) -> bool:
+        own, others = dict(mine.terms), dict[str, float]()
+        for name, factor in other.terms:
+            joint, sign = _our_joint(found, name)
+            others[joint] = sign * factor
+        return own.keys() == others.keys() and not any(
+            differs(one, two, tolerance)
+            for one, two in (
+                *((own[joint], others[joint]) for joint in own),
+                *zip(mine.range, other.range, strict=True),
+                *zip(mine.force_range, other.force_range, strict=True),
+                *zip(mine.spring_length, other.spring_length, strict=True),
+                (mine.stiffness, other.stiffness),
+                (mine.damping, other.damping),
+                (mine.friction, other.friction),
+                (mine.armature, other.armature),
+            )
+        )
+
+    return counterparts(ours.tendons, theirs.tendons, are_equal, lambda each: len(each.terms))
+
+
+def tendon_text(tendon: StatedTendon) -> str:
+    """Write a tendon, without what it has by default."""
+    words = [" + ".join(f"{number_text(factor)} {joint}" for joint, factor in tendon.terms)]
+    if tendon.stiffness:
+        ends = " to ".join(dict.fromkeys(map(number_text, tendon.spring_length)))
+        words.append(f"stiffness {number_text(tendon.stiffness)} at length {ends}")
+    numbers = (("damping", tendon.damping), ("friction", tendon.friction), ("armature", tendon.armature))
+    words += [f"{name} {number_text(value)}" for name, value in numbers if value]
+    ranges = (("range", tendon.range), ("forces", tendon.force_range))
+    words += [f"{what} {' to '.join(map(number_text, each))}" for what, each in ranges if each != UNBOUNDED]
+    return ", ".join(words)
+
+
+def _our_joint(found: Fit, theirs: str) -> tuple[str, int]:
+    """Return our joint for one of theirs, and the sign of its positions; their own name without a
+    counterpart."""
+    each = found.of_joint(theirs)
+    return (theirs, 1) if each is None else (found.ours.joints[each.ours].name, each.sign)
+
+
+# -- equality constraints ---------------------------------------------------------------------------------
+
+
+def equality_differences(
+    ours: Model, theirs: Model, found: Fit, tolerance: float
+) -> Iterator[Attribute | DescriptionFreedom]:
+    """Yield the equality constraints that differ, that one description has alone, or that have other names;
+    nothing where a description leaves them open. Call it inside `fifty_digits`.
+
+    A constraint of frames is equal to one of links that holds the same. One that couples the same parts in
+    the other order is a freedom.
+    """
+    if ours.equalities is None or theirs.equalities is None:
+        return
+    rules = _Constraints(ours, theirs, found, tolerance)
+    pairs = list(counterparts(ours.equalities, theirs.equalities, rules.are_equal, lambda each: each.type))
+    yield from part_differences(iter(pairs), "equality", "equality", equality_text, lambda each: each.type)
+    for mine, other, equal in pairs:
+        if equal and mine is not None and other is not None and not rules.are_in_order(mine, other):
+            name = other.name or other.type
+            message = f"constraint {name} couples the same parts in the other order"
+            yield DescriptionFreedom("constraint", mine.name or mine.type, name, message)
+
+
+def equality_text(equality: StatedEquality) -> str:
+    """Write a constraint, without what it has by default."""
+    words = [f"{equality.type} {equality.first}{f' to {equality.second}' if equality.second else ''}"]
+    if equality.object_type in ("joint", "tendon"):
+        numbers = [number_text(each) for each in equality.absolute_polynomial]
+        if not equality.second:
+            words.append(f"at {numbers[0]}")
+        elif equality.polynomial != LINEAR or any(equality.references):
+            words.append(f"polynomial {' '.join(numbers)}")
+    elif equality.type == "connect":
+        words.append(f"at {vector_text(equality.first_pose.xyz)}")
+    if equality.torque_scale != 1.0:
+        words.append(f"torque scale {number_text(equality.torque_scale)}")
+    softness = (("solref", equality.solref), ("solimp", equality.solimp))
+    words += [f"{name} {' '.join(map(number_text, each))}" for name, each in softness if each]
+    return ", ".join([*words, *([] if equality.active else ["not active"])])
+
+
+def coupled_as(equality: StatedEquality) -> tuple[str, str, float, float] | None:
+    """Return (joint, driver, multiplier, offset) of a linear coupling of two joints; None for another one."""
+    offset, multiplier, *higher = equality.absolute_polynomial.tolist()
+    if equality.type != "joint" or not equality.second or any(higher) or not equality.active:
+        return None
+    return equality.first, equality.second, multiplier, offset
+
+
+class _Constraints:
+    """What the constraints of two robots hold, in the terms of the first one."""
+
+    def __init__(self, ours: Model, theirs: Model, found: Fit, tolerance: float) -> None:
+        self._found, self._tolerance = found, tolerance
+        self._reach = tolerance * found.ours.reach
+        self._places = Places(ours, theirs, found)
+        self._tendons = {
+            other.name: mine.name
+            for mine, other in tendon_pairs(ours, theirs, found, tolerance)
+            if mine is not None and other is not None
+        }
+
+    def are_equal(self, mine: StatedEquality, other: StatedEquality) -> bool:
+        """Check whether two constraints hold the same."""
+        settings = (mine.type, mine.active), (other.type, other.active)
+        if settings[0] != settings[1] or differs(mine.torque_scale, other.torque_scale, self._tolerance):
+            return False
+        for name in ("solref", "solimp"):
+            numbers = getattr(mine, name), getattr(other, name)
+            if len(numbers[0]) != len(numbers[1]):
+                return False
+            if any(differs(a, b, self._tolerance) for a, b in zip(*numbers, strict=True)):
+                return False
+        return self.are_in_order(mine, other) or self._are_swapped(mine, other)
+
+    def are_in_order(self, mine: StatedEquality, other: StatedEquality) -> bool:
+        """Check whether two constraints of one type hold the same, first and second part as they are."""
+        if mine.type in ("joint", "tendon"):
+            names, numbers = self._coupling(other)
+            return mine.objects == names and self._same_numbers(mine.absolute_polynomial, numbers)
+        return self._same_places(mine, self._ends(other))
+
+    def _are_swapped(self, mine: StatedEquality, other: StatedEquality) -> bool:
+        if mine.type not in ("joint", "tendon"):
+            ends = self._ends(other)
+            return self._same_places(mine, ends[::-1], swapped=mine.type == "weld")
+        names, (a, b, *higher) = self._coupling(other)
+        if len(names) < 2 or any(higher) or b == 0.0 or mine.objects != names[::-1]:
+            return False
+        return self._same_numbers(mine.absolute_polynomial, np.array([-a / b, 1.0 / b, 0.0, 0.0, 0.0]))
+
+    def _coupling(self, other: StatedEquality) -> tuple[tuple[str, ...], Floats]:
+        """Return the names of our joints or tendons for a coupling of theirs, and its polynomial in our
+        positions."""
+        numbers = np.array(other.absolute_polynomial)
+        if other.type == "tendon":
+            return tuple(self._tendons.get(each, each) for each in other.objects), numbers
+        joints = [_our_joint(self._found, each) for each in other.objects]
+        signs = [sign for _, sign in joints] + [1]
+        return tuple(name for name, _ in joints), signs[0] * numbers * signs[1] ** np.arange(5.0)
+
+    def _same_numbers(self, mine: Floats, other: Floats) -> bool:
+        return not any(differs(a, b, self._tolerance) for a, b in zip(mine, other, strict=True))
+
+    def _ends(self, other: StatedEquality) -> list[PlaceInBody | None]:
+        """Return the places of what coincides, in our bodies."""
+        poses = other.first_pose, other.second_pose
+        places = [self._places.theirs(name) for name in other.objects]
+        return [
+            None if place is None else PlaceInBody(place.body, place.T @ decimals(pose.matrix))
+            for place, pose in zip(places, poses, strict=True)
+        ]
+
+    def _same_places(
+        self, mine: StatedEquality, ends: list[PlaceInBody | None], *, swapped: bool = False
+    ) -> bool:
+        """Check whether what coincides is in these places; of a `swapped` weld, MuJoCo measures the distance
+        at the other body, which is no difference."""
+        poses = mine.first_pose, mine.second_pose
+        own = [self._places.ours(name) for name in mine.objects]
+        if None in own or None in ends:
+            return False
+        placed = [
+            PlaceInBody(place.body, place.T @ decimals(pose.matrix))
+            for place, pose in zip(own, poses, strict=True)
+            if place is not None
+        ]
+        other = [each for each in ends if each is not None]
+        if [each.body for each in placed] != [each.body for each in other]:
+            return False
+        off = [inverse(one.T) @ two.T for one, two in zip(placed, other, strict=True)]
+        if mine.type == "weld":
+            # The poses in both bodies may be moved and turned together.
+            relative = [one.T @ inverse(two.T) for one, two in (placed, other)]
+            turned = inverse(relative[0]) @ relative[1]
+            if angle_of(turned) > self._tolerance or not self._is_near(turned):
+                return False
+        return swapped or all(map(self._is_near, off))
+
+    def _is_near(self, T: Array) -> bool:
+        return float(np.linalg.norm(rounded(T[:3, 3]))) <= self._reach
+
+
+# -- gravity compensation ---------------------------------------------------------------------------------
+
+
+def compensation_differences(ours: Model, theirs: Model, found: Fit, tolerance: float) -> Iterator[Attribute]:
+    """Yield the bodies whose weight is compensated otherwise; nothing where a description leaves it open.
+    Factors of links that are merged count by their masses."""
+    if ours.gravity_compensation is None or theirs.gravity_compensation is None:
+        return
+    for each in found.bodies:
+        mine, other = (_compensated(model, found, each, k) for k, model in enumerate((ours, theirs)))
+        if mine is None or other is None:
+            continue
+        size = max(1.0, float(np.abs(mine[0]).max()), float(np.abs(other[0]).max()))
+        reach = np.array([1.0, *[found.ours.reach or 1.0] * 3])
+        if (np.abs(mine[0] - other[0]) <= tolerance * size * reach).all():
+            continue
+        texts = mine[1], other[1] if other[1] != mine[1] else f"placed otherwise: {other[1]}"
+        yield Attribute("gravity compensation", "link", mine[2], other[2], *texts, mine[3], other[3])
+
+
+def _compensated(
+    model: Model, found: Fit, each: BodyFit, number: int
+) -> tuple[Floats, str, str, int | None] | None:
+    """Return the mass that is compensated and its first moment (4,), relative to the mass of the body, in the
+    axes of our body, then a text, the link and its line; None for a body without mass or of the world."""
+    skeleton, body = (found.ours, each.ours) if number == 0 else (found.theirs, each.theirs)
+    if body == ROOT and not model.floating:
+        return None
+    stated = {one.link: one for one in model.gravity_compensation or ()}
+    heavy = skeleton.heavy_links[body]
+    mass = sum(float(inertia.mass) for inertia in heavy.values())
+    if not mass:
+        return None
+    D = rounded(each.D) if number else np.eye(4)
+    total, words = np.zeros(4), []
+    for name, inertia in heavy.items():
+        factor = stated[name].factor if name in stated else 0.0
+        moment = D[:3, :3] @ inertia.first_moment + inertia.mass * D[:3, 3]
+        total += factor * np.array([inertia.mass, *moment]) / mass
+        words.append(number_text(factor))
+    link = next((name for name in heavy if name in stated), next(iter(heavy)))
+    line = stated[link].line if link in stated else model.link(link).line
+    return total, " and ".join(dict.fromkeys(words)), link, line
