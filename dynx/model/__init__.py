@@ -42,9 +42,9 @@ __all__ = [
 
 # Hidden from type checkers, which would take any name for an attribute.
 if not TYPE_CHECKING:
-    _STATED = {"Equality": "equalities", "GravityCompensation": "gravity_compensation"}
-    _STATED |= {"Sensor": "sensors", "Tendon": "tendons"}
-    __getattr__ = moved_names(__name__, {}, {f"Stated{k}": f"dynx.model.{v}" for k, v in _STATED.items()})
+    _PLACES = {"StatedEquality": "equalities", "StatedGravityCompensation": "gravity_compensation"}
+    _PLACES |= {"StatedSensor": "sensors", "StatedTendon": "tendons"}
+    __getattr__ = moved_names(__name__, {}, {name: f"dynx.model.{at}" for name, at in _PLACES.items()})
 else:
     from dynx.model.equalities import StatedEquality
     from dynx.model.gravity_compensation import StatedGravityCompensation
