@@ -267,6 +267,9 @@ GYMNASIUM = {
 """Functions, classes and attributes of Gymnasium."""
 
 SHORT = {
+    "keyframe": "Model.configurations[name]",
+    "keyframes": "Model.configurations",
+    "qpos0": "Model.initial_configuration",
     "com": "Backend.center_of_mass(q)",
     "cubic_spline": "dynx.trajectory.spline(times, waypoints)",
     "dof": "Model.nv, the number of velocities; Model.nq is that of coordinates",

@@ -41,10 +41,10 @@ def checked_q(tree: Tree, q: ArrayLike, name: str = "q") -> Floats:
     """Return a configuration (..., nq), whose quaternions, if any, must have unit norm to 1e-6.
 
     If its norm deviates by more than rounding, a quaternion is normalised in a copy, since engines treat
-    such quaternions differently.
+    such quaternions differently. The name of one of `Model.configurations` stands for it.
     """
     try:
-        array = checked_array(name, q, tree.nq)
+        array = checked_array(name, np.array(tree.configurations[q]) if isinstance(q, str) else q, tree.nq)
     except ShapeError as error:
         base = "position and quaternion (x, y, z, w) of the base, " if tree.floating else ""
         listed = ", ".join(map(shown, tree.joint_names[:8])) + ", ..." * (len(tree.joint_names) > 8)

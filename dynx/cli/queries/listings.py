@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from itertools import groupby
 from typing import Any
@@ -55,10 +56,28 @@ def model_document(model: Model) -> dict[str, Any]:
             }
             for link in model.links
         ],
-        "sensors": None if model.sensors is None else [asdict(sensor) for sensor in model.sensors],
+        **{name: _records(getattr(model, name)) for name in DATA},
+        "initial_configuration": model.initial_configuration.tolist(),
         "configurations": {name: q.tolist() for name, q in model.configurations.items()},
         "notes": [asdict(note) for note in model.notes],
     }
+
+
+DATA = ("actuators", "sensors", "tendons", "equalities", "gravity_compensation")
+"""Fields of a model with what its description states as data."""
+
+
+def _records(parts: Iterable[Any] | None) -> list[dict[str, Any]] | None:
+    """Return data of a model as JSON; a bound that is infinite becomes null."""
+    if parts is None:
+        return None
+    return [{name: _finite(value) for name, value in asdict(each).items()} for each in parts]
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, tuple | list):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and math.isinf(value) else value
 
 
 def _joint_entry(joint: Joint) -> dict[str, Any]:
@@ -98,10 +117,9 @@ def _show(model: Model) -> None:
     added = [frame.name for frame in model.extra_frames]
     if added:
         out.print(f"frames besides the links: {', '.join(map(one_line, added))}")
-    if model.sensors:
-        out.print(f"sensors: {', '.join(one_line(_sensor(each)) for each in model.sensors)}")
-    if model.configurations:
-        out.print(f"named configurations: {', '.join(map(one_line, model.configurations))}")
+    for what, words in _data_lines(model):
+        if words:
+            out.print(f"{what} ({len(words)}): {', '.join(map(one_line, words))}")
     for note in model.notes:
         out.print(f"note: {one_line(note)}", style="yellow")
 
@@ -150,10 +168,30 @@ def _mimic_rule(joint: Joint) -> str:
     return f"{number(joint.mimic.multiplier)} * {one_line(joint.mimic.joint)}{offset}"
 
 
+def _data_lines(model: Model) -> Iterator[tuple[str, list[str]]]:
+    """Yield each kind of data that the description states, with what stands for each of them."""
+    yield "actuators", [_named(each.name, each.joint or each.tendon) for each in model.actuators or ()]
+    yield "sensors", [_sensor(each) for each in model.sensors or ()]
+    yield "tendons", [_named(each.name, " ".join(each.joints)) for each in model.tendons or ()]
+    yield (
+        "equality constraints",
+        [_named(each.name, " ".join((each.type, *each.objects))) for each in model.equalities or ()],
+    )
+    yield (
+        "gravity compensation",
+        [f"{each.link} ({number(each.factor)})" for each in model.gravity_compensation or ()],
+    )
+    yield "named configurations", list(model.configurations)
+
+
+def _named(name: str, words: str) -> str:
+    return f"{name} ({words})" if name else words
+
+
 def _sensor(sensor: StatedSensor) -> str:
     """Write name, type and objects of a sensor."""
     words = [sensor.type, *(name for _, name in sensor.objects)]
-    return f"{sensor.name} ({' '.join(words)})" if sensor.name else " ".join(words)
+    return _named(sensor.name, " ".join(words))
 
 
 def _vector(values: tuple[float, ...]) -> str:

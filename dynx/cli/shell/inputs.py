@@ -98,7 +98,11 @@ def configuration(
 
 def _named_configuration(model: Model, name: str, option: str) -> Floats:
     try:
-        return np.array(model.configurations[name])
+        q = np.array(model.configurations[name])
+        for note in model.notes:
+            if f"keyframe {shown(name)}" in note.message:
+                remark(str(note))
+        return q
     except UnknownNameError as error:
         hint = "" if model.configurations else "; wanted numbers, such as 0,1.5,... or joint=value,..."
         raise UnknownNameError(f"{option}: {error}{hint}") from error

@@ -19,8 +19,14 @@ STANDARD_OUTPUT = "-"
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-CONFIGURATION_FORM = "0,1.5,... or joint=value,... or the name of a keyframe of the robot's MJCF file"
+CONFIGURATION_FORM = (
+    "0,1.5,... or joint=value,... or the name of a keyframe of the robot's MJCF file (name:NAME if it looks "
+    "like numbers)"
+)
 """Forms of `configuration_text`."""
+
+NAME_PREFIX = "name:"
+"""Beginning of a configuration that is a name, even if that looks like numbers."""
 
 _NAME = re.compile(r"(?!(?:nan|inf(?:inity)?)\b)[^\W\d][^=,]*", re.IGNORECASE)
 
@@ -40,9 +46,21 @@ def number_list(text: str) -> list[float] | dict[str, float]:
 
 
 def configuration_text(text: str) -> list[float] | dict[str, float] | str:
-    """Read numbers as `number_list` does, or the name of a configuration, which begins with a letter."""
+    """Read numbers as `number_list` does, or the name of a configuration: one that begins with a letter, or
+    any other after ``name:``."""
     name = text.strip()
-    return name if _NAME.fullmatch(name) else number_list(text)
+    if name.startswith(NAME_PREFIX):
+        return name.removeprefix(NAME_PREFIX)
+    if _NAME.fullmatch(name):
+        return name
+    words = name.replace(",", " ").split()
+    wrong = [word for word in words if "=" not in word and _NAME.fullmatch(word)]
+    if len(wrong) < len(words) and wrong:
+        raise click.BadParameter(
+            f"{shown(wrong[0])} among the values is no joint=value; wanted {CONFIGURATION_FORM}, and a name "
+            "stands alone"
+        )
+    return number_list(text)
 
 
 def plain_numbers(text: str) -> list[float]:

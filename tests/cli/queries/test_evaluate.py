@@ -594,11 +594,55 @@ def test_configurations_of_the_file_are_shown_and_taken_by_name(tmp_path: Path) 
     path.write_text(KEYED)
     assert document("info", str(path))["configurations"] == {"home": [0.5], "far out": [-0.25]}
     shown = CliRunner().invoke(cli, ["info", str(path)])
-    assert "named configurations: home, far out" in shown.stdout
+    assert "named configurations (2): home, far out" in shown.stdout
     for name, q in (("home", "0.5"), ("far out", "-0.25")):
         assert document("fk", str(path), "--q", name) == document("fk", str(path), "--q", q)
     moved = document("sim", str(path), "--from", "home", "--to", "far out", "--duration", "0.1")
     assert (moved["motion"]["from"], moved["motion"]["to"]) == ([0.5], [-0.25])
+
+
+def test_a_name_that_looks_like_numbers_and_a_note_on_a_short_keyframe(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    second = '<body name="c"><joint name="k"/><geom size="0.1"/></body></body></worldbody>'
+    text = KEYED.replace("</body></worldbody>", second).replace(
+        '"far out" qpos="-0.25"', '"0.2,3" qpos="1 2"'
+    )
+    path.write_text(text)
+    given = document("fk", str(path), "--q", "name:0.2,3")
+    assert given == document("fk", str(path), "--q", "1,2")
+    assert given != document("fk", str(path), "--q", "0.2,3")
+    short = CliRunner().invoke(cli, ["fk", str(path), "--q", "home"])
+    assert "qpos of keyframe 'home' has 1 of 2 numbers" in " ".join(short.stderr.split())
+    other = CliRunner().invoke(cli, ["fk", str(path), "--q", "name:0.2,3"])
+    assert "qpos of keyframe" not in other.stderr
+
+
+def test_data_of_the_file_is_counted_and_named(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    data = (
+        '<tendon><fixed name="t" range="0 1"><joint joint="j" coef="2"/></fixed></tendon>'
+        '<equality><joint joint1="j"/></equality><actuator><motor name="m" tendon="t"/></actuator>'
+        '<sensor><jointpos name="s" joint="j"/></sensor></mujoco>'
+    )
+    path.write_text(KEYED.replace("</mujoco>", data).replace('name="b"', 'name="b" gravcomp="0.5"'))
+    shown = CliRunner().invoke(cli, ["info", str(path)]).stdout
+    for line in (
+        "actuators (1): m (t)",
+        "sensors (1): s (jointpos j)",
+        "tendons (1): t (j)",
+        "equality constraints (1): joint j",
+        "gravity compensation (1): b (0.5)",
+        "named configurations (2): home, far out",
+    ):
+        assert line in shown
+    found = document("info", str(path))
+    assert found["tendons"][0]["terms"] == [["j", 2.0]]
+    assert found["tendons"][0]["range"] == [0.0, 1.0]
+    assert found["actuators"][0]["control_range"] == [None, None]
+    assert found["equalities"][0]["first"] == "j"
+    assert found["gravity_compensation"][0]["factor"] == 0.5
+    assert found["initial_configuration"] == [0.0]
+    assert document("info", "planar_2r")["tendons"] is None
 
 
 @pytest.mark.parametrize(
@@ -608,6 +652,8 @@ def test_configurations_of_the_file_are_shown_and_taken_by_name(tmp_path: Path) 
         ("ur5", "home", "its description has none; wanted numbers"),
         ("ur5", "nan", "'nan' is not finite"),
         ("ur5", "1;2", "'1;2' is not a number"),
+        ("arm.xml", "j=0.7,hom", "'hom' among the values is no joint=value; wanted 0,1.5,... or joint="),
+        ("arm.xml", "name:0,1", "no configuration '0,1' of arm"),
     ],
 )
 def test_other_names_of_configurations_are_refused(tmp_path: Path, robot: str, q: str, message: str) -> None:

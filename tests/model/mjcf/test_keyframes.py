@@ -221,3 +221,21 @@ def test_keyframes_of_files_around_an_included_one(tmp_path: Path) -> None:
     path = tmp_path / "scene.xml"
     path.write_text('<mujoco><include file="robot.xml"/><keyframe><key name="k"/></keyframe></mujoco>')
     assert list(dynx.load(path).configurations) == ["inside", "k"]
+
+
+def test_names_of_configurations_stand_for_q() -> None:
+    text = """<mujoco>
+      <worldbody><body name="b"><joint name="j"/><geom size="0.1" pos="1 0 0"/></body></worldbody>
+      <keyframe><key name="home" qpos="0.5"/></keyframe></mujoco>"""
+    model = dynx.load(text)
+    for name in ("reference", "compiled"):
+        engine = dynx.backend(name, model)
+        assert np.array_equal(engine.forward_kinematics("home"), engine.forward_kinematics([0.5]))
+        with pytest.raises(UnknownNameError, match="did you mean 'home'"):
+            engine.gravity_torque("hom")
+    assert dynx.simulate(model, duration=0.01, q0="home").q[0] == 0.5
+    assert model.integrate("home", [0.25]) == 0.75
+    with pytest.raises(AttributeError, match=r"Model\.configurations"):
+        model.keyframes  # type: ignore[attr-defined]  # noqa: B018
+    with pytest.raises(UnknownNameError, match="its description has none"):
+        dynx.backend("reference", dynx.load("planar_2r")).gravity_torque("home")
