@@ -334,8 +334,7 @@ class Actuator:
     With the command u, and the position q and velocity v of the joint, the force is
     ``f = gain u + bias[0] + bias[1] gear q + bias[2] gear v``, and the effort is ``gear f`` [N m or N], as in
     MuJoCo. u is kept within `control_range`, f within `force_range`. `name` may be empty. If the actuator
-    acts on a `tendon`, `joint` is empty, q and v are length and velocity of the tendon, and the effort is the
-    tension.
+    acts on a `tendon`, `joint` is empty; q, v and the effort are length, velocity and tension of that.
     """
 
     name: str

@@ -37,8 +37,8 @@ class Model(Tree):
     fixed base has the pose `base_pose` in the world.
 
     `geometry` holds the visual and collision shapes of the links, `contact_filter` which of them may touch,
-    `actuators` what drives the joints, `sensors` what is sensed, `configurations` which positions have names.
-    They affect no dynamics without contacts and commands, so models that differ in them alone are equal.
+    `configurations` which positions have names. `actuators`, `sensors`, `tendons`, `equalities` and
+    `gravity_compensation` are data. All affect no dynamics, so models that differ in them alone are equal.
 
     Models are immutable; they compare by content (`==`), hash and pickle.
     """

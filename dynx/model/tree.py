@@ -207,9 +207,11 @@ class Tree:
     @cached_property
     def initial_configuration(self) -> Floats:
         """Configuration q (nq,) in which MJCF places the robot (`qpos0`), else the neutral one; read-only."""
-        from dynx.model.named_configurations import initial_configuration  # few flows need it
+        return self._initial_configuration()
 
-        return initial_configuration(self)
+    @door("dynx.model.named_configurations:initial_configuration")
+    def _initial_configuration(self) -> Floats:
+        raise NotImplementedError
 
     @door("dynx.model.named_configurations:named_configurations")
     def _named_configurations(self) -> Mapping[str, Floats]:
@@ -302,7 +304,8 @@ class Tree:
         except (KeyError, TypeError):
             from dynx.model.unknown_names import unknown_name_message
 
-            raise UnknownNameError(unknown_name_message(self, kind, name, known)) from None
+            message = unknown_name_message(self.name, self.links, self.joints, kind, name, known)
+            raise UnknownNameError(message) from None
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ DOORS = {
     "dynx.model.model:Model.order_of": "dynx.loaded.order:order_of",
     "dynx.model.model:Model.with_configuration": "dynx.model.named_configurations:with_configuration",
     "dynx.model.model:Model._repr_html_": "dynx.model.model_page:model_page",
+    "dynx.model.tree:Tree._initial_configuration": "dynx.model.named_configurations:initial_configuration",
     "dynx.model.tree:Tree._named_configurations": "dynx.model.named_configurations:named_configurations",
     "dynx.model.model:Model.to_sdf": "dynx.model.sdf.writer:write_sdf",
     "dynx.model.model:Model.to_mjcf": "dynx.model.mjcf.writer:write_mjcf",
