@@ -63,6 +63,8 @@ class Thrown(Push):
 
 
 def test_a_world_that_diverges_is_truncated(engine: str) -> None:
+    if engine == "dynx":
+        pytest.skip("its joints stop at their limits under any torque")
     with TaskEnvironment(Thrown(), engine) as env:
         first, _ = env.reset(seed=0)
         action = np.zeros(3, dtype=np.float32)
