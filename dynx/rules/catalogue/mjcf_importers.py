@@ -557,7 +557,7 @@ def _joints_in_text(case: Case, document: MjcfText) -> Iterator[tuple[BodyInText
 
 
 class IncludeOfMjcf(Rule):
-    """DX613 include-of-mjcf: The file includes another one, which Pinocchio and PyBullet leave out.
+    """DX613 include-of-mjcf: The file includes another one, which some engines leave out.
 
     ``<include file="robot.xml"/>`` inserts the contents of another file. Usually the file of a scene includes
     the file of a robot.
@@ -597,7 +597,7 @@ class ModelWithoutName(EditingRule):
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
-    advice = "Write the attribute model of <mujoco>."
+    advice = "Write the attribute model of the root element."
     engines = measured_on("drake")
     changed = 'wrote model="robot"'
 
