@@ -45,7 +45,11 @@ def target_notes(model: Model, robot: str, kp: Floats, target: Floats) -> Iterat
     """Yield a sentence for each target (n,) of the motors of a robot that is far beyond the limits of its
     joint; `kp` (n,) is the stiffness of the motors, zero where a joint has no target."""
     q, driven = model.neutral(), np.flatnonzero(kp)
-    q[len(q) - len(target) + driven] = target[driven]
+    places = np.array(model.mechanism.places[6 * model.floating :], dtype=np.intp)
+    if model.ball_joints:
+        q[places[driven]] = target[driven]
+    else:
+        q[len(q) - len(target) + driven] = target[driven]
     yield from position_notes(model, q, f"the target of the motors of {shown(robot)}")
 
 

@@ -178,7 +178,7 @@ class OutsideJoints:
         the robot."""
         own, has = robot.coefficients(), in_engine.coefficients()
         self._dynamics, self._h, self._reached = dynamics, h, reached
-        self._robot, self._limited = robot, bool(np.isfinite([robot.lower, robot.upper]).any())
+        self._robot, self._limited = robot, robot.limited
         self._inertia = np.diag(has.armature)
         self._damping = has.damping
         friction = own.friction - has.friction
@@ -227,10 +227,9 @@ class OutsideJoints:
 
     def _is_at_limit(self, q: Floats, v: Floats) -> bool:
         """Check whether a joint is at a limit or beyond it, or reaches one in a step with its velocity."""
-        robot, base = self._robot, 6 if self._robot.model.floating else 0
-        ahead = q.copy()
-        ahead[len(q) - len(v) + base :] += self._h * v[base:]
-        tree_q, first = robot.model.mechanism.tree_q, 7 if base else 0
-        now, then = tree_q(q)[first:], tree_q(ahead)[first:]
-        below, above = np.minimum(now, then) <= robot.lower, np.maximum(now, then) >= robot.upper
+        robot, ahead = self._robot, self._h * v
+        ahead[: 6 * robot.model.floating] = 0.0
+        now, lower, upper = robot.joint_positions(q)
+        then, _, _ = robot.joint_positions(robot.model.integrate(q, ahead))
+        below, above = np.minimum(now, then) <= lower, np.maximum(now, then) >= upper
         return bool(below.any() or above.any())

@@ -84,6 +84,29 @@ class RobotLayout:
     """Stiffness (n,) of the joints' springs [N m/rad or N/m]."""
     spring_reference: Floats
     """Positions (n,) at which the springs do not pull [rad or m]."""
+    largest_angles: tuple[float, ...] = ()
+    """Largest angle [rad] of each ball joint, infinite where it has none; in the arrays over joints the three
+    entries of a ball joint have no limit."""
+
+    @property
+    def limited(self) -> bool:
+        """True if a joint has a limit."""
+        angles = np.isfinite(self.largest_angles).any()
+        return bool(angles or np.isfinite([self.lower, self.upper]).any())
+
+    def joint_positions(self, q: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the position of each moving joint at q (nq,), its lower and its upper limit, (n,) each; of a
+        ball joint the angle of its rotation."""
+        model = self.model
+        if not model.ball_joints:
+            return model.mechanism.tree_q(q)[7 if model.floating else 0 :], self.lower, self.upper
+        from dynx.model.limited_positions import limited_positions  # most robots have no ball joints
+
+        firsts = [k for k, body in enumerate(model.mechanism.bodies) if not body.ball]
+        lower, upper = self.lower[firsts], self.upper[firsts]
+        balls = [k for k, joint in enumerate(model.coordinate_joints) if joint.type == "ball"]
+        upper[balls] = self.largest_angles
+        return limited_positions(model, q), lower, upper
 
     @property
     def springs(self) -> JointSprings | None:

@@ -86,6 +86,9 @@ class Stepper(ABC):
     commands: ClassVar[tuple[type[EngineCommand], ...]] = ()
     """Classes of the commands that the engine's own motors take (`Forces.commands`)."""
 
+    takes_ball_joints: ClassVar[bool] = False
+    """True for an engine that moves robots with ball joints; others refuse these by name."""
+
     inexact: ClassVar[Mapping[Feature, str]] = {}
     """Damping, dry friction and armature of joints that the engine has with an error, each with the kind of
     the error as a clause. Of a robot that neither contacts nor constraints can reach,

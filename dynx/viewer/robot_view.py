@@ -21,7 +21,7 @@ from dynx.rbd.kinematics import frame_poses, link_poses
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import rotation_from_quat
+from dynx.spatial.so3 import quat_exp, quat_log, rotation_from_quat
 from dynx.viewer.browser import CopyButton
 from dynx.viewer.colours import BLUE, VERMILION
 from dynx.viewer.controls import slider_step
@@ -60,8 +60,10 @@ _ANGLE_RANGES = ((-math.pi, math.pi), (-math.pi / 2, math.pi / 2), (-math.pi, ma
 class JointSliders:
     """The sliders of a robot, and its configuration.
 
-    A floating base has six more, for its position and its rotation. Where a configuration is beyond the range
-    of a slider, the range grows to it: the page shows the configuration as it is.
+    A floating base has six more, for its position and its rotation. A ball joint has three, for its rotation
+    vector in the axes of the joint, and is turned back where that is beyond its largest angle. Where a
+    configuration is beyond the range of a slider, the range grows to it: the page shows the configuration as
+    it is.
     """
 
     def __init__(self, gui: Any, model: Model, q: Floats, changed: Callable[[Floats], None]) -> None:
@@ -69,6 +71,10 @@ class JointSliders:
         self._gui, self._model, self._changed = gui, model, changed
         self._q = q.copy()
         self._base = self._base_of(q)
+        joints = [(model.position_index(joint.name), joint) for joint in model.coordinate_joints]
+        self._places = [(at, k) for at, joint in joints for k in range(joint.n_rates)]
+        """Index in q of the joint of each slider after those of the base, and the axis of a ball joint."""
+        self._rotations = self._rotations_of(q)
         self._base_ranges = [(x - _BASE_REACH, x + _BASE_REACH) for x in self._base[:3]] + [*_ANGLE_RANGES]
         self._degrees = True
         self._handles: list[Any] = []
@@ -84,7 +90,7 @@ class JointSliders:
 
     def put(self, q: Floats) -> None:
         """Move the sliders to a configuration (nq,), without calling `changed`."""
-        self._q, self._base = q.copy(), self._base_of(q)
+        self._q, self._base, self._rotations = q.copy(), self._base_of(q), self._rotations_of(q)
         rows = zip(self._handles, self._values(), self._factors(), self._ranges(), strict=True)
         for handle, value, factor, (low, high) in rows:
             low, high = _range_around(value * factor, low * factor, high * factor)
@@ -97,32 +103,40 @@ class JointSliders:
         """Return the values of the sliders of the base at a configuration: none, or six."""
         return [*q[:3].tolist(), *rpy_from_quat(q[3:7]).tolist()] if self._model.floating else []
 
-    def _values(self) -> list[float]:
-        return [*self._base, *self._q[self._offset :].tolist()]
+    def _rotations_of(self, q: Floats) -> dict[int, list[float]]:
+        """Return the rotation vector of each ball joint, by its index in q."""
+        return {first: quat_log(q[first : first + 4]).tolist() for first in self._model.ball_places}
 
-    @property
-    def _offset(self) -> int:
-        return 7 if self._model.floating else 0
+    def _values(self) -> list[float]:
+        joints = [
+            self._rotations[at][k] if at in self._rotations else float(self._q[at]) for at, k in self._places
+        ]
+        return [*self._base, *joints]
 
     @property
     def _units(self) -> list[str]:
         base = _BASE_UNITS.values() if self._model.floating else ()
-        return [*base, *(joint.unit for joint in self._model.coordinate_joints)]
+        joints = self._model.coordinate_joints
+        return [*base, *(joint.unit for joint in joints for _ in range(joint.n_rates))]
 
     def _factors(self) -> list[float]:
         turn = 180.0 / math.pi if self._degrees else 1.0
         return [turn if unit == "rad" else 1.0 for unit in self._units]
 
     def _ranges(self) -> list[tuple[float, float]]:
-        lower, upper = self._model.lower[self._offset :], self._model.upper[self._offset :]
-        joints = [
-            sampling_range(float(low), float(high), _DEFAULT_RANGE[joint.unit])
-            for low, high, joint in zip(lower, upper, self._model.coordinate_joints, strict=True)
-        ]
+        ranges = []
+        for joint in self._model.coordinate_joints:
+            at = self._model.position_index(joint.name)
+            low, high = float(self._model.lower[at]), float(self._model.upper[at])
+            if joint.type == "ball":
+                high = min(joint.limits.upper, math.pi)
+                low = -high
+            ranges += [sampling_range(low, high, _DEFAULT_RANGE[joint.unit])] * joint.n_rates
+        joints = ranges
         return [*(self._base_ranges if self._model.floating else []), *joints]
 
     def _add(self) -> None:
-        names = [*(_BASE_UNITS if self._model.floating else ()), *self._model.joint_names]
+        names = [*(_BASE_UNITS if self._model.floating else ()), *self._model.coordinate_names]
         rows = zip(names, self._units, self._values(), self._factors(), self._ranges(), strict=True)
         with self._folder:
             for k, (name, unit, value, factor, (low, high)) in enumerate(rows):
@@ -150,7 +164,13 @@ class JointSliders:
         # While a number is typed, the page sends it also where it is beyond the range.
         value = min(max(float(handle.value), handle.min), handle.max) / self._factors()[k]
         if k >= len(self._base):
-            self._q[self._offset + k - len(self._base)] = value
+            at, axis = self._places[k - len(self._base)]
+            if at in self._rotations:
+                self._rotations[at][axis] = value
+                self._q[at : at + 4] = quat_exp(np.array(self._rotations[at]))
+                self._q = self._model.clip(self._q)
+            else:
+                self._q[at] = value
         else:
             # The angles of the sliders are kept: at a pitch of 90 degrees the rotation does not tell them.
             self._base[k] = value
@@ -340,25 +360,30 @@ class GravityTorques:
             self._arrows.visible = bool(arrows)
 
     def _arrows_at(self, q: Floats) -> Iterator[tuple[str, str, Floats]]:
-        """Yield the name of each joint with a torque, the number, and the ends (2, 3) of its arrow."""
+        """Yield the name of each coordinate with a torque, the number, and the ends (2, 3) of its arrow."""
         model = self._model
-        tau = self._engine().gravity_torque(q)[model.nv - len(model.joint_names) :]
-        limit = model.effort_limit[model.nv - len(model.joint_names) :]
+        tau = self._engine().gravity_torque(q)[6 * model.floating :]
+        limit = model.effort_limit[6 * model.floating :]
         unlimited = ~(np.isfinite(limit) & (limit > 0.0))
         largest = float(np.abs(tau[unlimited]).max(initial=0.0)) or 1.0
         share = np.clip(tau / np.where(unlimited, largest, np.where(limit > 0.0, limit, 1.0)), -1.0, 1.0)
         poses = dict(link_poses(model, q))
-        for k, joint in enumerate(model.coordinate_joints):
+        # The torque of a ball joint acts about the axes of its child.
+        joints = [
+            (joint, np.asarray(axis, dtype=np.float64))
+            for joint in model.coordinate_joints
+            for axis in (np.eye(3) if joint.type == "ball" else [joint.axis])
+        ]
+        for k, (joint, axis) in enumerate(joints):
             if abs(share[k]) < _LEAST:
                 continue
             T = poses[joint.child]
-            axis = np.asarray(joint.axis, dtype=np.float64)
             along = math.copysign(1.0, share[k]) * T[:3, :3] @ (axis / np.linalg.norm(axis))
             leaves = self._robot.way_out(T[:3, 3], along, _THIN * self._size, self._robot.links)
             start = T[:3, 3] + leaves * along
             unit = "N" if joint.type == "prismatic" else "N m"
             end = start + (_HEAD + _LONGEST * abs(share[k])) * self._size * along
-            yield joint.name, f"{tau[k]:.3g} {unit}", np.stack([start, end])
+            yield model.coordinate_names[k], f"{tau[k]:.3g} {unit}", np.stack([start, end])
 
 
 class Manipulability:
@@ -381,7 +406,7 @@ class Manipulability:
             self._node.visible = self.shown
         if not self.shown:
             return
-        J = self._engine().jacobian(q, frame)[:3, self._model.nv - len(self._model.joint_names) :]
+        J = self._engine().jacobian(q, frame)[:3, 6 * self._model.floating :]
         U, values, _ = np.linalg.svd(J)
         half = np.zeros(3)
         half[: len(values)] = values

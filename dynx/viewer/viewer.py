@@ -18,7 +18,6 @@ from dynx.errors import ArgumentError, nearest, shown
 from dynx.files.films import WRITERS
 from dynx.files.reading import checked_path
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.loading import load
 from dynx.model.numbers import checked_vector, is_real, whole_number
 from dynx.spatial.scalar import Floats
@@ -109,7 +108,6 @@ def open_subject(shown_object: object) -> object:
     if isinstance(shown_object, str | os.PathLike | bytes):
         shown_object = load(shown_object)
     if isinstance(shown_object, Model):
-        refuse_ball_joints(shown_object, "the viewer")
         return shown_object
     from dynx.sim import BatchRollouts, Rollout
     from dynx.world import Scene, World

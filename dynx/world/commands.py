@@ -43,6 +43,12 @@ class RobotLoads:
         self._armature = np.diag(robot.coefficients().armature) if robot.armature.any() else None
         self.model = robot.model
         self._base = 6 if robot.model.floating else 0
+        self._places: list[int] | None = None
+        """Index of each coordinate in the positions of the joints, in a robot with ball joints, on which no
+        motor acts."""
+        if robot.model.ball_joints:
+            skipped = 7 if self._base else 0
+            self._places = [place - skipped for place in robot.model.mechanism.places[self._base :]]
         self._h = h
         self._nothing = np.zeros(robot.model.nv)
         self._motors: tuple[Motor, ...] = ()
@@ -80,7 +86,7 @@ class RobotLoads:
         """Yield one sentence for joint dynamics outside of the engine that are not exact, and for each of the
         engine's own that has an error."""
         ours, theirs = self._robot, self._in_engine
-        limited = bool(np.isfinite([ours.lower, ours.upper]).any())
+        limited = ours.limited
         if self.joints is not None and not self.joints.only_springs and (self._reached or limited):
             names = ("damping", "friction", "armature")
             outside = [name for name in names if (getattr(ours, name) != getattr(theirs, name)).any()]
@@ -232,6 +238,8 @@ class RobotLoads:
 
     def _motor_torque(self, positions: Floats, rates: Floats) -> Floats:
         law = self._law
+        if self._places is not None:
+            positions = positions[self._places]
         return law.torque + law.kp * (law.target - positions) + law.kd * (law.velocity - rates)
 
     def _saturated(self, motor: Floats) -> Floats:

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dynx.backends import Backend
+from dynx.model import Joint, Model
 from dynx.rbd.jacobians import LOCAL, Reference
 from dynx.rbd.joint_wrenches import about_world
 from dynx.spatial.scalar import Floats
@@ -231,11 +232,27 @@ class _System:
         return engine.jacobian(q, link, point=point[:3])
 
 
+def _first_coordinates(model: Model) -> list[tuple[Joint, int]]:
+    """Return the joints with coordinates, each with the index in v of its first."""
+    return [(joint, model.coordinate_index(joint.name)) for joint in model.coordinate_joints]
+
+
 def _joints_at_limits(robot: RobotLayout, step: StepRecord) -> Floats:
     """Return 1 for the coordinates (nv,) of a robot that may have reached a limit in a step, else 0."""
     model = robot.model
     base = 6 if model.floating else 0
     (q, v), (q_after, _) = step.before.robots[robot.name], step.after.robots[robot.name]
+    if model.ball_joints:
+        turned = step.h * np.array(
+            [np.linalg.norm(v[k : k + joint.n_rates]) for joint, k in _first_coordinates(model)]
+        )
+        (before, lower, upper), (after, _, _) = robot.joint_positions(q), robot.joint_positions(q_after)
+        reach = NEAR_LIMIT + turned
+        near = (np.minimum(before, after) < lower + reach) | (np.maximum(before, after) > upper - reach)
+        found = np.zeros(model.nv)
+        for (joint, k), is_near in zip(_first_coordinates(model), near.tolist(), strict=True):
+            found[k : k + joint.n_rates] = is_near
+        return found
     S = np.eye(model.nv) if model.mechanism.coupling is None else model.mechanism.coupling.matrix()
     reach = NEAR_LIMIT + step.h * abs(S @ v)[base:]
     positions = [model.mechanism.tree_q(each)[7 if base else 0 :] for each in (q, q_after)]

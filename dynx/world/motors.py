@@ -21,7 +21,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, GainError, ShapeError, UnknownNameError, nearest, shown
+from dynx.errors import (
+    ArgumentError,
+    GainError,
+    ShapeError,
+    UnknownNameError,
+    UnsupportedFeatureError,
+    nearest,
+    shown,
+)
 from dynx.model import Model
 from dynx.model.numbers import checked_entries, real_array
 from dynx.spatial.scalar import Floats
@@ -57,7 +65,7 @@ class Motor(ABC):
     @abstractmethod
     @checks_types
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:
-        """Return the numbers of the joints, in the order of `Model.joint_names`, and the law of each.
+        """Return the numbers of the joints, in the order of `Model.coordinate_names`, and the law of each.
 
         Raises ArgumentError or GainError for numbers that the robot's joints cannot have.
         """
@@ -152,7 +160,7 @@ def combine(model: Model, motors: Sequence[Motor]) -> tuple[JointLaw, Floats]:
 
     Joints without a motor have no gains and no torque. Raises ArgumentError for a joint with two motors.
     """
-    n = len(model.joint_names)
+    n = len(model.coordinate_names)
     columns = {name: np.zeros(n) for name in LAW}
     columns["max_force"] += np.inf
     implicit, taken = np.zeros(n), np.zeros(n, dtype=bool)
@@ -161,7 +169,7 @@ def combine(model: Model, motors: Sequence[Motor]) -> tuple[JointLaw, Floats]:
         for joint in joints:
             if taken[joint]:
                 raise ArgumentError(
-                    f"two motors act on {shown(model.joint_names[joint])}; wanted one for a joint"
+                    f"two motors act on {shown(model.coordinate_names[joint])}; wanted one for a joint"
                 )
             taken[joint] = True
         index = list(joints)
@@ -172,9 +180,9 @@ def combine(model: Model, motors: Sequence[Motor]) -> tuple[JointLaw, Floats]:
 
 
 def _joint_numbers(kind: str, model: Model, joints: Sequence[str] | None) -> tuple[int, ...]:
-    if joints is None:
-        return tuple(range(len(model.joint_names)))
     names = list(model.joint_names)
+    if joints is None:
+        joints = names
     if isinstance(joints, str) or not isinstance(joints, Sequence):
         raise ArgumentError(f"joints of a {kind} is {shown(joints)}; wanted a list of names")
     for name in joints:
@@ -182,7 +190,13 @@ def _joint_numbers(kind: str, model: Model, joints: Sequence[str] | None) -> tup
             raise UnknownNameError(
                 f"{model.name} has no joint {shown(name)} with a coordinate{nearest(name, names)}"
             )
-    return tuple(names.index(name) for name in joints)
+        if model.joint(name).type == "ball":
+            raise UnsupportedFeatureError(
+                f"{shown(name)} of {model.name} is a ball joint, on which no {kind} acts; name other joints "
+                "in `joints`, or give torques"
+            )
+    base = 6 if model.floating else 0
+    return tuple(model.coordinate_index(name) - base for name in joints)
 
 
 def _per_joint(kind: str, name: str, value: ArrayLike, n: int) -> Floats:

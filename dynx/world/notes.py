@@ -84,8 +84,7 @@ def unbounded_motions(layout: Layout, state: WorldState) -> Iterator[str]:
                 f"almost no inertia about {' and '.join(joints) or 'its base'}"
             )
         elif (axes := _massless_gimbal(model.mechanism)) is not None:
-            moving = [joint.name for joint in model.joints if joint.moves]
-            first, last = (shown(f"{robot.name}/{moving[k]}") for k in axes)
+            first, last = (shown(f"{robot.name}/{model.mechanism.bodies[k].joint}") for k in axes)
             yield (
                 f"the links between {first} and {last} have no mass, so that the motion has no bound where "
                 "the axes of these two joints align"
@@ -93,9 +92,10 @@ def unbounded_motions(layout: Layout, state: WorldState) -> Iterator[str]:
 
 
 def _massless_gimbal(mechanism: Mechanism) -> tuple[int, int] | None:
-    """Return the first and the last of three revolute joints in series without mass between them."""
+    """Return the first and the last of three revolute joints in series without mass between them; the axes of
+    a ball joint never align."""
     children = Counter(body.parent for body in mechanism.bodies)
-    for last, body in enumerate(mechanism.bodies):
+    for last in range(len(mechanism.bodies)):
         chain = [last]
         while len(chain) < 3 and (parent := mechanism.bodies[chain[-1]].parent) != ROOT:
             inertia = mechanism.bodies[parent].inertia
@@ -104,7 +104,8 @@ def _massless_gimbal(mechanism: Mechanism) -> tuple[int, int] | None:
             if children[parent] > 1:
                 break
             chain.append(parent)
-        if len(chain) == 3 and body.revolute and all(mechanism.bodies[k].revolute for k in chain):
+        bodies = [mechanism.bodies[k] for k in chain]
+        if len(chain) == 3 and all(each.revolute and each.ball is None for each in bodies):
             return chain[-1], last
     return None
 
@@ -236,7 +237,9 @@ def _joints_without_range(layout: Layout) -> list[str]:
         f"{robot.name}/{joint.name}"
         for robot in layout.robots
         for joint, low, high in zip(
-            (each for each in robot.model.joints if each.moves), robot.lower, robot.upper, strict=True
+            (each for each in robot.model.joints if each.moves),
+            *robot.joint_positions(robot.q)[1:],
+            strict=True,
         )
         if low == high
     ]
@@ -255,10 +258,8 @@ def joints_beyond_limits(layout: Layout, state: WorldState) -> list[str]:
     """Return the beginning of a sentence for each joint that is beyond a limit."""
     found = []
     for robot in layout.robots:
-        model, q = robot.model, state.robots[robot.name].q
-        positions = model.mechanism.tree_q(q)[7 if model.floating else 0 :]
-        names = [f"{robot.name}/{joint.name}" for joint in model.joints if joint.moves]
-        found += beyond_limits(names, positions, robot.lower, robot.upper)
+        names = [f"{robot.name}/{joint.name}" for joint in robot.model.joints if joint.moves]
+        found += beyond_limits(names, *robot.joint_positions(state.robots[robot.name].q))
     return found
 
 
@@ -363,7 +364,7 @@ def _gains_and_torques(layout: Layout, state: WorldState, loads: LastLoads, h: f
     for load in loads.robots:
         robot = layout.robots[load.robot]
         mobility = _mobility(load.mass_matrix(state.robots[robot.name].q))
-        names = robot.model.joint_names
+        names = robot.model.coordinate_names
         base = len(mobility) - len(names)
         if load.law is not None and load.implicit is not None and len(names):
             yield from _stiff_gains(robot.name, names, load.law, load.implicit, mobility[base:], h)
@@ -406,7 +407,7 @@ def _implicit_gains(layout: Layout, state: WorldState, loads: LastLoads, h: floa
     """
     for load in loads.robots:
         robot = layout.robots[load.robot]
-        names = robot.model.joint_names
+        names = robot.model.coordinate_names
         if load.law is None or load.implicit is None or not len(names):
             continue
         mobility = _mobility(load.mass_matrix(state.robots[robot.name].q))[-len(names) :]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import ArgumentError, EngineLimitError, UnsupportedFeatureError, shown
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import Pose
 from dynx.model.geometry import Collision, Mesh
 from dynx.model.numbers import positive_seconds, whole_number
@@ -95,19 +96,25 @@ def _robot(
     springs: bool,
 ) -> RobotLayout:
     model = robot.model if robot.model.gravity == gravity else replace(robot.model, gravity=gravity)
-    moving = [joint for joint in model.joints if joint.moves]
+    moving = [joint for joint in model.joints if joint.moves for _ in range(joint.n_rates)]
     n = len(moving)
     lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
+    angles = [np.inf] * len(model.ball_joints)
     if limits:
         for k, joint in enumerate(moving):
-            lower[k], upper[k] = sorted((joint.limits.lower, joint.limits.upper))
+            if joint.type != "ball":
+                lower[k], upper[k] = sorted((joint.limits.lower, joint.limits.upper))
+        # The angle of a rotation is at most pi.
+        found = (joint.limits.upper for joint in model.ball_joints)
+        angles = [angle if angle < np.pi else np.inf for angle in found]
     switches = {"damping": damping, "friction": friction, "armature": armature}
     switches |= {"stiffness": springs, "spring_reference": springs}
     dynamics = {
         name: np.array([getattr(joint.dynamics, name) if acts else 0.0 for joint in moving])
         for name, acts in switches.items()
     }
-    return RobotLayout(robot.name, model, np.array(robot.q), np.array(robot.v), lower, upper, **dynamics)
+    q, v = np.array(robot.q), np.array(robot.v)
+    return RobotLayout(robot.name, model, q, v, lower, upper, **dynamics, largest_angles=tuple(angles))
 
 
 def _body(body: SceneBody) -> BodyLayout:
@@ -137,7 +144,10 @@ def layout_for(kind: type[Stepper], layout: Layout) -> Layout:
     does not have.
     """
     provided = kind.provides(layout)
-    limited = any(np.isfinite([*robot.lower, *robot.upper]).any() for robot in layout.robots)
+    for robot in layout.robots:
+        if robot.model.ball_joints and not kind.takes_ball_joints:
+            refuse_ball_joints(robot.model, f"a world on {shown(kind.name)}")
+    limited = any(robot.limited for robot in layout.robots)
     needed = {
         Feature.CONTACTS: layout.collides.any(),
         Feature.LIMITS: limited,

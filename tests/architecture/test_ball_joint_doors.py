@@ -61,12 +61,6 @@ def of_file(act: Callable[[str], object]) -> Callable[[Path], object]:
     return called
 
 
-def viewed(path: str) -> object:
-    from dynx.viewer.viewer import open_subject
-
-    return open_subject(path)
-
-
 def loaded(path: str) -> object:
     from dynx.loaded import load_as
 
@@ -92,6 +86,11 @@ def velocity_ik() -> object:
     return engine().velocity_ik(Q, VelocityTask("hand", target=pose()), dt=0.01)
 
 
+def world_on(engine: str) -> object:
+    scene = dynx.world.Scene("arm", robots=(dynx.world.SceneRobot("arm", MODEL),))
+    return dynx.world.World(scene, engine, dt=1e-3)
+
+
 REFUSED: dict[str, Callable[[Path], object]] = {
     "to_urdf": lambda folder: MODEL.to_urdf(),
     "to_urdf with shapes": lambda folder: MODEL.to_urdf(geometry=True),
@@ -114,18 +113,23 @@ REFUSED: dict[str, Callable[[Path], object]] = {
     "simulate_batch with limits": lambda folder: dynx.simulate_batch(
         MODEL, control.PD(MODEL, kp=1.0, kd=1.0), MODEL.neutral(), rollouts=2, duration=0.1
     ),
+    "a world on PyBullet": lambda folder: world_on("pybullet"),
+    "a world on Drake": lambda folder: world_on("drake"),
+    "a motor": lambda folder: dynx.world.SceneRobot("arm", MODEL, motors=dynx.world.VelocityMotor(0.0, 1.0)),
+    "an encoder": lambda folder: dynx.world.Scene(
+        "arm",
+        robots=(dynx.world.SceneRobot("arm", MODEL),),
+        sensors=(dynx.world.Encoder("angle", "shoulder"),),
+    ),
     "Encoders": lambda folder: control.Encoders(
         control.PD(MODEL, kp=1.0, kd=1.0), resolution=0.1, control_dt=0.01
     ),
-    "SceneRobot": lambda folder: dynx.world.SceneRobot("arm", MODEL),
-    "read_scene": of_file(lambda path: dynx.world.read_scene(path)),
     "same_robot of models": lambda folder: dynx.same_robot(MODEL, STRAIGHT),
     "same_robot of files": of_file(lambda path: dynx.same_robot(path, path)),
     "diagnose a model": lambda folder: raised(dynx.diagnose(MODEL)),
     "diagnose a file": of_file(lambda path: raised(dynx.diagnose(path))),
     "compare_as_loaded": of_file(lambda path: raised(dynx.compare_as_loaded(path))),
     "load_as": of_file(loaded),
-    "view": of_file(viewed),
     "dynx/Reach": of_file(reach),
     "lock": lambda folder: dynx.load(MODEL, lock={"shoulder": 0.1}),
 }
@@ -147,7 +151,6 @@ COMMANDS_THAT_REFUSE = (
     ("convert", "ROBOT", "--to", "urdf"),
     ("doctor", "ROBOT"),
     ("same", "ROBOT", "ROBOT"),
-    ("view", "ROBOT"),
 )
 
 

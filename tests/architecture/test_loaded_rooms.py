@@ -97,7 +97,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         104,
-        18850,
+        18900,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -107,7 +107,7 @@ FLOWS = {
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
         154,
-        27260,
+        27320,
     ),
 }
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dynx.engines.mujoco.library import mujoco
-from dynx.engines.mujoco.mjcf import body_coordinates, robot_coordinates
+from dynx.engines.mujoco.mjcf import body_coordinates, from_wxyz, robot_coordinates
 from dynx.model import Model
 from dynx.spatial.plain import minus_cross, rotate, rotate_back, rotation_rows
 from dynx.spatial.scalar import Floats
@@ -34,6 +34,7 @@ class RobotCoordinates:
         self._coupling = mechanism.coupling
         self._q: Floats = data.qpos[first[0] : first[0] + mechanism.nq]
         self._v: Floats = data.qvel[first[1] : first[1] + mechanism.nv]
+        self._from_wxyz = from_wxyz(mechanism) if mechanism.balls else None
         self._joint_q, self._joint_v = (self._q[7:], self._v[6:]) if model.floating else (self._q, self._v)
         self.applied: Floats = data.qfrc_applied[first[1] : first[1] + mechanism.nv]
         """Generalised forces of MuJoCo that act in the next steps, of the tree."""
@@ -46,7 +47,9 @@ class RobotCoordinates:
 
     def read(self) -> RobotState:
         """Return new arrays q, v in the coordinates of the model."""
-        if self._coupling is None:
+        if self._from_wxyz is not None:
+            q, v = self._q[self._from_wxyz], self._v.copy()
+        elif self._coupling is None:
             q, v = self._q.copy(), self._v.copy()
         else:
             q, v = self._q[self._own_q], self._v[self._own_v]
@@ -61,7 +64,7 @@ class RobotCoordinates:
 
     def read_joints(self) -> RobotState:
         """Return new arrays of the positions and velocities of the joints of the model."""
-        if self._coupling is not None:
+        if self._coupling is not None or self._from_wxyz is not None:
             q, v = self.read()
             return RobotState(q[7:], v[6:]) if self._floating else RobotState(q, v)
         return RobotState(self._joint_q.copy(), self._joint_v.copy())

@@ -28,6 +28,7 @@ from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.engines.mujoco.materials import (
     MIMIC_IMPEDANCE,
@@ -40,7 +41,7 @@ from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model import Model
 from dynx.model.elements import Joint, JointDynamics
 from dynx.model.geometry import HeightField, Mesh, Plane, Shape
-from dynx.model.mechanism import ROOT
+from dynx.model.mechanism import ROOT, Mechanism
 from dynx.model.mjcf.attributes import (
     MAX_DEPTH,
     attributes,
@@ -72,7 +73,18 @@ def robot_coordinates(model: Model, q: Floats, v: Floats) -> tuple[Floats, Float
         q[:3] += R @ center
         q[3:7] = q[[6, 3, 4, 5]]
         v[:3] = R @ (v[:3] + cross(v[3:6], center))
+    for ball in model.ball_places:
+        q[ball : ball + 4] = q[[ball + 3, ball, ball + 1, ball + 2]]
     return q, v
+
+
+def from_wxyz(mechanism: Mechanism) -> NDArray[np.intp]:
+    """Return the place (nq,) in MuJoCo's q of each entry of q, except for a floating base: quaternions of
+    ball joints are (w, x, y, z) there."""
+    order = np.arange(mechanism.nq)
+    for ball in mechanism.ball_places:
+        order[ball : ball + 4] = ball + 1, ball + 2, ball + 3, ball
+    return order
 
 
 def body_coordinates(T: Floats, twist: Floats, center: Floats) -> tuple[Floats, Floats]:
@@ -394,9 +406,11 @@ class MjcfDocument:
             index = frame.body
             if link in moving:
                 each = mechanism.bodies[index]
-                parent = carriers[each.parent]
-                body = SubElement(parent.body, "body", {"name": name, **parent.placement(each.R, each.p)})
-                carriers[index], depths[index] = Carrier(body, np.zeros(3)), depths[each.parent] + 1
+                # The first of the three bodies of a ball joint has its pose.
+                first = each if each.ball is None else mechanism.bodies[index - 2]
+                parent = carriers[first.parent]
+                body = SubElement(parent.body, "body", {"name": name, **parent.placement(first.R, first.p)})
+                carriers[index], depths[index] = Carrier(body, np.zeros(3)), depths[first.parent] + 1
                 if depths[index] > MAX_DEPTH:
                     raise EngineLimitError(
                         f"robot {shown(robot.name)} has more than {MAX_DEPTH} moving links in a row; MuJoCo "
@@ -443,7 +457,8 @@ class MjcfDocument:
         own = [joint for joint in moving if joint.mimic is None]
         for joint in own:
             name = f"{robot.name}/{joint.name}"
-            SubElement(self._actuator, "motor", name=name, joint=name)
+            if joint.type != "ball":
+                SubElement(self._actuator, "motor", name=name, joint=name)
         coupling = robot.model.mechanism.coupling
         if coupling is None:
             return
@@ -638,9 +653,13 @@ def _append_state(q: list[Floats], v: list[Floats], state: tuple[Floats, Floats]
 
 
 def _add_joint(body: Element, robot: RobotLayout, index: int, joint: Joint) -> None:
+    limits = float(robot.lower[index]), float(robot.upper[index])
+    if joint.type == "ball":
+        largest = robot.largest_angles[robot.model.ball_joints.index(joint)]
+        limits = (0.0, largest) if np.isfinite(largest) else limits
     given = joint_attributes(
         joint,
-        (float(robot.lower[index]), float(robot.upper[index])),
+        limits,
         JointDynamics(
             robot.damping[index],
             robot.friction[index],

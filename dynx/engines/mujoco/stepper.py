@@ -128,6 +128,7 @@ class MujocoStepper(Stepper):
 
     name: ClassVar[str] = "mujoco"
     settings: ClassVar[Mapping[str, Any]] = SETTINGS
+    takes_ball_joints: ClassVar[bool] = True
     contact_law: ClassVar[str] = "damped springs between accelerations at contacts and joint limits"
     inexact: ClassVar[Mapping[Feature, str]] = {
         Feature.DRY_FRICTION: "a soft constraint, so that joints that stick creep, at any step",

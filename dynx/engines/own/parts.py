@@ -243,7 +243,6 @@ class OwnBody(OwnRobot):
 
 def robot_of(robot: RobotLayout, h: float, settings: Mapping[str, Any]) -> OwnRobot:
     """Return a robot of the scene at its start."""
-    limited = bool(np.isfinite([robot.lower, robot.upper]).any())
-    made = OwnRobot(robot.model, robot.coefficients(), h, settings, limited=limited)
+    made = OwnRobot(robot.model, robot.coefficients(), h, settings, limited=robot.limited)
     made.q, made.v = robot.q.copy(), robot.v.copy()
     return made

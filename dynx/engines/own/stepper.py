@@ -66,6 +66,7 @@ class OwnStepper(Stepper):
             1e-12, "absolute tolerance of the integrator `adaptive`", least=1e-300, needs=_ADAPTIVE
         ),
     }
+    takes_ball_joints: ClassVar[bool] = True
     contact_law: ClassVar[str] = (
         "rigid contacts with circular cones of Coulomb friction and Poisson's restitution, and joint limits "
         "at which joints stop without a rebound"
@@ -314,7 +315,7 @@ class OwnStepper(Stepper):
 
 def _refuse_limited_ball_joints(robot: RobotLayout) -> None:
     """Raise UnsupportedFeatureError, naming the joint, for a limit that impulses of an island do not have."""
-    if robot.model.ball_joints and np.isfinite([robot.lower, robot.upper]).any():
+    if robot.model.ball_joints and robot.limited:
         ball = robot.model.ball_joints[0]
         raise UnsupportedFeatureError(
             f"the robot {shown(robot.name)} has joint limits and the ball joint {shown(ball.name)}, which "

@@ -18,7 +18,7 @@ import numpy as np
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 from dynx.files.documents import convert_document
 from dynx.model import Model, Pose
-from dynx.model.documents import pose_numbers
+from dynx.model.documents import pose_numbers, with_balls_for_hinges, with_hinges_for_balls
 from dynx.model.elements import IDENTITY, ZERO
 from dynx.model.geometry import (
     Appearance,
@@ -129,7 +129,8 @@ class MotorDocument:
 class RobotDocument:
     """A robot: `robot` is the name of one that dynx knows, a file beside the scene, or
     ``package://pybullet_data/FILE``; `urdf` is the text of its description,
-    whose meshes are looked for in `mesh_folders`.
+    whose meshes are looked for in `mesh_folders`, with hinges in the place of `ball_joints`, which URDF does
+    not have.
 
     `base` replaces that of the description. `q` is a list (nq) or the positions of joints by name; `pose` is
     that of the base, fixed or floating.
@@ -139,6 +140,7 @@ class RobotDocument:
     robot: str | None = None
     urdf: str | None = None
     mesh_folders: list[str] = field(default_factory=list)
+    ball_joints: list[str] = field(default_factory=list)
     base: Literal["fixed", "floating"] | None = None
     pose: Vector | None = None
     lock: dict[str, float] = field(default_factory=dict)
@@ -310,7 +312,7 @@ def _model(given: RobotDocument, paths: ScenePaths | None) -> Model:
     if (given.robot is None) == (given.urdf is None):
         raise ArgumentError("wanted either robot (a name or a file) or urdf (its text)")
     if given.urdf is not None:
-        return read_model(
+        model = read_model(
             given.urdf,
             "<string>",
             given.name,
@@ -318,6 +320,7 @@ def _model(given: RobotDocument, paths: ScenePaths | None) -> Model:
             lock=given.lock or None,
             package_dirs=(paths or ScenePaths(None)).folders(given.mesh_folders),
         )
+        return with_balls_for_hinges(model, given.ball_joints)
     assert given.robot is not None
     if paths is None:
         raise ArgumentError(
@@ -549,7 +552,8 @@ def _robot_document(robot: SceneRobot) -> RobotDocument:
     return RobotDocument(
         robot.name,
         # Base and pose have keys of their own; gravity is stated by the text.
-        urdf=replace(model, base="fixed", base_pose=IDENTITY).to_urdf(geometry=True),
+        urdf=replace(with_hinges_for_balls(model), base="fixed", base_pose=IDENTITY).to_urdf(geometry=True),
+        ball_joints=[joint.name for joint in model.ball_joints],
         mesh_folders=_mesh_folders(model),
         base="floating" if model.floating else None,
         pose=_pose_document(model.base_pose),

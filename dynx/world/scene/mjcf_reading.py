@@ -14,7 +14,6 @@ from pathlib import PurePath
 import numpy as np
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import Inertial, Mimic, NamedConfiguration, Note, Pose, Vector
 from dynx.model.geometry import LinkGeometry
 from dynx.model.loading import build_described
@@ -82,9 +81,6 @@ class _SceneReader:
 
     def scene(self) -> Scene:
         trees, reading = self._trees, self._reading
-        for tree in trees.trees:
-            if any(joint.type == "ball" for joint in tree.description.joints):
-                refuse_ball_joints(build_described(tree.description, self._source), "a scene")
         equalities = list(self._equalities())
         exported = [as_exported(tree) for tree in trees.trees]
         keyframes = self._states_of_keyframes(exported)
@@ -266,7 +262,8 @@ class _SceneReader:
             v[:3], v[3:6] = R.T @ start.twist[:3], R.T @ start.twist[3:]
         for joint, speed in start.speeds.items():
             if joint in own:
-                (v[model.coordinate_index(joint)],) = speed
+                first = model.coordinate_index(joint)
+                v[first : first + len(speed)] = speed
         materials = {}
         found: list[MjcfCollider] = []
         for body in tree.bodies:

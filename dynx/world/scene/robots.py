@@ -128,10 +128,6 @@ class SceneRobot:
     def __post_init__(self) -> None:
         checked_name("robot", self.name)
         refuse_other_than_model(self.model)
-        if self.model.ball_joints:
-            from dynx.model.ball_joints import refuse_ball_joints  # most robots have none
-
-            refuse_ball_joints(self.model, "a scene")
         what = f"robot {shown(self.name)}"
         q = checked_q(self.model, neutral(self.model) if self.q is None else self.q, f"q of {what}")
         zero: ArrayLike = [0.0] * self.model.nv

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model import Model, Pose
 from dynx.model.elements import IDENTITY, Joint, checked_pose
 from dynx.model.numbers import positive_number
@@ -318,5 +318,10 @@ def _moving_joint(sensor: Sensor, model: Model, name: str) -> Joint:
         raise UnknownNameError(
             f"{sensor} is on {shown(name)}, which {'is a fixed joint' if fixed else 'is no joint'} of "
             f"{model.name}; wanted a joint that moves{nearest(name, joints)}"
+        )
+    if joints[name].type == "ball":
+        raise UnsupportedFeatureError(
+            f"{sensor} is on {shown(name)}, a ball joint of {model.name}, which has no single position or "
+            "axis; a ForceTorqueSensor on it and an Imu on its child measure its wrench and its rotation"
         )
     return joints[name]

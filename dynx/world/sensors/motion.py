@@ -63,8 +63,8 @@ class RobotMotion:
     def joint_state(self, joint: Joint) -> tuple[Floats, Floats]:
         """Return the position and the velocity (n,) of a joint, also of a mimic joint."""
         if joint.mimic is None:
-            at = self.model.coordinate_index(joint.name)
-            return self.q[:, at + (1 if self.model.floating else 0)], self.v[:, at]
+            in_q, in_v = self.model.position_index(joint.name), self.model.coordinate_index(joint.name)
+            return self.q[:, in_q], self.v[:, in_v]
         driver = next(each for each in self.model.joints if each.name == joint.mimic.joint)
         position, velocity = self.joint_state(driver)
         return joint.mimic.multiplier * position + joint.mimic.offset, joint.mimic.multiplier * velocity
