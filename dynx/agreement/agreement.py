@@ -68,8 +68,9 @@ def agree(
 ) -> AgreementReport:
     """Compare the results of backends on a robot.
 
-    `model` is a `Model` or whatever `dynx.load` takes. `backends` are names (default: all installed backends)
-    or backends made of this model, which dynx does not close. dynx compares every quantity pairwise at
+    `model` is a `Model` or whatever `dynx.load` takes. `backends` are names (default: all installed backends,
+    for a robot with ball joints those that take them) or backends made of this model, which dynx does not
+    close. dynx compares every quantity pairwise at
     `samples` states that follow from `seed`, and with the 50-digit referee at `referee_samples` of these
     states. It compares quantities that an engine computes itself with those that dynx derives from the
     engine's poses and inverse dynamics. It also tests each backend against the identities of mechanics.
@@ -88,12 +89,17 @@ def agree(
         seconds = time.perf_counter() - started
         return refused_report(_label(model), error, backends=names, seconds=seconds)
     _require_same_model(loaded, chosen)
+    left_out: list[str] = []
+    if backends is None and loaded.ball_joints:
+        left_out = [name for name in names if not backend_class(name).takes_ball_joints]
+        chosen = [each for each in chosen if each not in left_out]
+        names = [name for name in names if name not in left_out]
     try:
         # NaN and infinity from an engine appear in the report, so NumPy's warnings are silenced.
         with ExitStack() as opened, np.errstate(all="ignore"):
             engines = [_open(each, loaded, opened) for each in chosen]
             tell = progress or (lambda step: None)
-            return _compare_all(loaded, engines, samples, seed, referee_samples, tell, started)
+            return _compare_all(loaded, engines, samples, seed, referee_samples, tell, started, left_out)
     except DynxError as error:
         return refused_report(
             loaded.name,
@@ -113,6 +119,7 @@ def _compare_all(
     referee_samples: int,
     progress: Progress,
     started: float,
+    left_out: Sequence[str],
 ) -> AgreementReport:
     names = _distinct_names(engines)
     samples = draw_samples(model, count, seed)
@@ -123,7 +130,7 @@ def _compare_all(
         progress(f"{first.name}~{second.name}")
         rows += [compare(quantity, first, second, magnitudes) for quantity in compared_quantities()]
         rows.append(compare_forward_dynamics(first, second, magnitudes))
-        if model.nv and not model.ball_joints:
+        if model.nv:
             rows.append(compare_inverse_kinematics(first, second, magnitudes))
     if referee_samples:
         progress(REFEREE)
@@ -153,7 +160,7 @@ def _compare_all(
         quantities=tuple(rows),
         identities=tuple(identities),
         suspects=find_suspects(rows, identities, names),
-        notes=_notes(model, names),
+        notes=_notes(model, names, left_out),
         seconds=time.perf_counter() - started,
     )
 
@@ -189,7 +196,7 @@ def _compare_with_derived(magnitudes: Magnitudes, name: str, engine: Backend) ->
     return rows
 
 
-def _notes(model: Model, names: list[str]) -> tuple[str, ...]:
+def _notes(model: Model, names: list[str], left_out: Sequence[str]) -> tuple[str, ...]:
     notes = [str(note) for note in model.notes]
     singular = singular_coordinates(model)
     if singular:
@@ -197,8 +204,8 @@ def _notes(model: Model, names: list[str]) -> tuple[str, ...]:
             f"the mass matrix is singular ({singular.reason}): "
             "forward dynamics has no solution, and each backend must refuse it"
         )
-    if model.ball_joints:
-        notes.append("the robot has ball joints, which inverse kinematics does not take: it is not compared")
+    if left_out:
+        notes.append(f"ball joints are not taken by {' and '.join(left_out)}: not compared")
     if len(names) == 1:
         notes.append("a single backend: compared with the referee and with itself only")
     return tuple(notes)

@@ -67,7 +67,7 @@ def loaded(path: str) -> object:
     return load_as("mujoco", path, MODEL)
 
 
-def raised(report: dynx.DoctorReport) -> object:
+def raised(report: dynx.DoctorReport | dynx.AgreementReport) -> object:
     """Raise the error that a report has instead of results."""
     if report.error is not None:
         raise UnsupportedFeatureError(report.error.message)
@@ -113,6 +113,7 @@ REFUSED: dict[str, Callable[[Path], object]] = {
     "simulate_batch with limits": lambda folder: dynx.simulate_batch(
         MODEL, control.PD(MODEL, kp=1.0, kd=1.0), MODEL.neutral(), rollouts=2, duration=0.1
     ),
+    "agree with PyBullet": lambda folder: raised(dynx.agree(MODEL, ["reference", "pybullet"])),
     "a world on PyBullet": lambda folder: world_on("pybullet"),
     "a world on Drake": lambda folder: world_on("drake"),
     "a motor": lambda folder: dynx.world.SceneRobot("arm", MODEL, motors=dynx.world.VelocityMotor(0.0, 1.0)),
@@ -143,6 +144,7 @@ COMMANDS_THAT_COMPUTE = (
     ("mass", "ROBOT"),
     ("convert", "ROBOT", "--to", "sdf"),
     ("agree", "ROBOT", "--backends", "reference,compiled"),
+    ("agree", "ROBOT", "--samples", "3"),
     ("sim", "ROBOT", "--duration", "0.1"),
     ("ik", "ROBOT", "--target", "0,0,0.4", "--frame", "hand"),
 )

@@ -365,3 +365,47 @@ def test_a_log_of_positions_gives_velocities(tmp_path: Path) -> None:
     # The error of a central difference is h^2 / 6 times the jerk, 60 times the displacement at most.
     most = 0.005**2 * 10.0 * np.abs(model.difference(wanted.q[0], wanted.q[-1])).max()
     assert np.max(np.abs(log.v - wanted.v)[1:-1]) < most
+
+
+# -- engines' own steppers ------------------------------------------------------------------------
+
+
+@each_base
+def test_the_stepper_of_mujoco_is_a_plant(base: str) -> None:
+    """MuJoCo's Euler is semi-implicit Euler of dynx, also with dry friction, which dynx solves for."""
+    pytest.importorskip("mujoco")
+    model = arm(base, JointDynamics(0.1, 0.05, 0.02), Limits(upper=2.0))
+    options: Any = {"duration": 0.1, "dt": 1e-3, **start(model)}
+    own = dynx.simulate(model, plant="mujoco", integrator="engine", **options)
+    wanted = dynx.simulate(model, plant="reference", **options)
+    assert np.max(np.abs(model.difference(own.q, wanted.q))) < 1e-11
+    assert np.max(np.abs(own.v - wanted.v)) < 1e-9
+
+
+def test_coefficients_of_each_axis_are_refused_by_an_engine() -> None:
+    pytest.importorskip("mujoco")
+    model = arm()
+    with pytest.raises(
+        UnsupportedFeatureError, match="'shoulder' of arm is a ball joint, of which an"
+    ):
+        dynx.simulate(
+            model,
+            duration=0.01,
+            plant="mujoco",
+            integrator="engine",
+            joint_damping=np.arange(model.nv, dtype=float),
+            **start(model),
+        )
+
+
+def test_a_robot_in_a_scene_is_a_plant() -> None:
+    pytest.importorskip("mujoco")
+    from dynx.world import Scene, SceneRobot
+
+    model = arm()
+    scene = Scene("arm", robots=(SceneRobot("arm", model, q=model.random(0)),))
+    law = control.PD(model, kp=100.0, kd=10.0)
+    plant = dynx.sim.ScenePlant(scene, "arm", "mujoco")
+    run = dynx.simulate(model, law, model.random(0), duration=0.2, dt=1e-3, plant=plant)
+    alone = dynx.simulate(model, law, model.random(0), duration=0.2, dt=1e-3, plant="reference")
+    assert np.max(np.abs(model.difference(run.q, alone.q))) < 1e-10

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.control.bullet import BulletMotor
-from dynx.errors import EngineError
+from dynx.errors import EngineError, UnsupportedFeatureError, shown
 from dynx.model import Model
-from dynx.model.elements import JointDynamics
+from dynx.model.elements import Joint, JointDynamics
 from dynx.model.geometry import Geometry
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.plant import Plant, StepResult
@@ -103,6 +103,19 @@ class LoneRobotPlant(Plant):
         beside = self._loads.torque_beside_motors(self._q, self._v, tau, self._acting(t))
         return self._advance(Forces([(0, beside)], commands={0: command})), beside
 
+    def _positions(self, stuck: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return the positions of joints in q that stay, for coordinates (n,) that are `stuck`.
+
+        The quaternion of a ball joint stays if all three are.
+        """
+        if not self.model.ball_joints:
+            return stuck
+        masks, first = [], 0
+        for joint in self.model.coordinate_joints:
+            masks.append(np.full(joint.n_positions, stuck[first : first + joint.n_rates].all()))
+            first += joint.n_rates
+        return np.concatenate(masks)
+
     def _acting(self, t: float) -> Sequence[tuple[str, ExternalForce, float]]:
         """Return the pushes with their shares of the step of the engine at `t`."""
         if not self.disturbances.pushes:
@@ -119,7 +132,7 @@ class LoneRobotPlant(Plant):
         self._stepper.step(1, forces)
         self._q, self._v = self._stepper.robot_state(0)
         if stuck is not None:
-            np.copyto(self._q[self._joints_of_q], q[self._joints_of_q], where=stuck)
+            np.copyto(self._q[self._joints_of_q], q[self._joints_of_q], where=self._positions(stuck))
             np.copyto(self._v[self._joints_of_v], 0.0, where=stuck)
         if stuck is not None or self.model.floating:
             # The engine is set to the reported state, rounding of the conversion included, so that a rollout
@@ -256,10 +269,10 @@ def with_joint_dynamics(model: Model, disturbances: Disturbances) -> Model:
         pairs = zip(friction.damping[base:].tolist(), friction.friction[base:].tolist(), strict=True)
         laws = {
             joint.name: JointDynamics(damping=damping, friction=dry)
-            for joint, (damping, dry) in zip(owners, pairs, strict=True)
+            for joint, (damping, dry) in _by_joint(model, owners, list(pairs))
         }
-    rotors = zip(model.coordinate_joints, disturbances.armature.diagonal()[base:].tolist(), strict=True)
-    for joint, armature in rotors:
+    rotors = disturbances.armature.diagonal()[base:].tolist()
+    for joint, armature in _by_joint(model, model.coordinate_joints, rotors):
         laws[joint.name] = replace(laws.get(joint.name, JointDynamics()), armature=armature)
     for joint in model.joints if disturbances.springs is not None else ():
         own = joint.dynamics
@@ -267,3 +280,20 @@ def with_joint_dynamics(model: Model, disturbances: Disturbances) -> Model:
         laws[joint.name] = replace(laws.get(joint.name, JointDynamics()), **spring)
     joints = tuple(replace(joint, dynamics=laws.get(joint.name, JointDynamics())) for joint in model.joints)
     return model if joints == model.joints else replace(model, joints=joints)
+
+
+def _by_joint(model: Model, joints: Sequence[Joint], values: list[Any]) -> Iterator[tuple[Joint, Any]]:
+    """Yield each joint with its value, of those of the coordinates; an engine has one for a ball joint.
+
+    Raises UnsupportedFeatureError for a ball joint whose three coordinates have different values.
+    """
+    first = 0
+    for joint in joints:
+        own = values[first : first + joint.n_rates]
+        if any(each != own[0] for each in own):
+            raise UnsupportedFeatureError(
+                f"{shown(joint.name)} of {model.name} is a ball joint, of which an engine has one damping, "
+                f"friction and armature about all axes; got {shown(own)}"
+            )
+        first += joint.n_rates
+        yield joint, own[0]
