@@ -11,6 +11,9 @@ locked or follow others. They also write a floating base differently:
 | `drake` | w, x, y, z, then x, y, z | angular before linear, in axes of the world | the angle |
 | `pybullet` | x, y, z, then x, y, z, w | linear and angular in axes of the world | the angle |
 
+MuJoCo has the quaternion of a ball joint as w, x, y, z, and its velocity in the axes of the child, as dynx.
+The other engines refuse robots with ball joints here.
+
 PyBullet has no vectors q and v. Here they are what `getBasePositionAndOrientation` and `getBaseVelocity`
 return, if the base floats, and then the joints that are not fixed, in the order of `getJointInfo`. The base
 of PyBullet is the inertial frame of the root link.
@@ -21,6 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,20 +64,20 @@ class EngineOrder:
         """Index (nq,) in the engine's q of each entry of dynx's q. If the engine has the cosine and sine of
         an angle, this is the index of the cosine."""
         base = self.coordinates.base
-        own = [self.coordinates.joints_q[k] for k in self._own]
+        own = [self.coordinates.joints_q[k] for k in self._own("q")]
         return np.array([*(() if base is None else base.q), *own], dtype=np.intp)
 
     @cached_property
     def velocities(self) -> Array:
         """Index (nv,) in the engine's v of each entry of dynx's v."""
         base = self.coordinates.base
-        own = [self.coordinates.joints_v[k] for k in self._own]
+        own = [self.coordinates.joints_v[k] for k in self._own("v")]
         return np.array([*(() if base is None else base.v), *own], dtype=np.intp)
 
     def from_dynx(self, q: ArrayLike) -> Floats:
         """Return the engine's q (..., n) at a configuration `q` (..., nq) of dynx."""
         q = checked_q(self.model, q)
-        source, scale, offset = self._couplings
+        source, scale, offset = self._position_couplings
         coordinates = self.coordinates
         joints = _padded(q)[..., source] * scale + offset
         out = np.empty((*q.shape[:-1], len(coordinates.neutral)))
@@ -96,8 +100,8 @@ class EngineOrder:
         coordinates = self.coordinates
         q = checked_array("q", q, len(coordinates.neutral))
         out = q[..., self.positions]
-        first = self.model.nq - len(self._own)
-        for k, number in enumerate(self._own, first):
+        own = self._own("q")
+        for k, number in enumerate(own, self.model.nq - len(own)):
             if coordinates.circles[number]:
                 at = coordinates.joints_q[number]
                 out[..., k] = np.arctan2(q[..., at + 1], q[..., at])
@@ -108,9 +112,9 @@ class EngineOrder:
     def velocity_from_dynx(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return the engine's v (..., n) at `q` (..., nq) and `v` (..., nv) of dynx."""
         q, v = checked_q(self.model, q), checked_array("v", v, self.model.nv)
-        source, scale, _ = self._couplings
-        base, shift = self.coordinates.base, self.model.nq - self.model.nv
-        joints = _padded(v)[..., np.where(scale != 0.0, source - shift, -1)] * scale
+        source, scale, _ = self._rate_couplings
+        base = self.coordinates.base
+        joints = _padded(v)[..., source] * scale
         shape = np.broadcast_shapes(q.shape[:-1], v.shape[:-1])
         out = np.zeros((*shape, self.coordinates.n_velocities))
         out[..., list(self.coordinates.joints_v)] = joints
@@ -135,24 +139,45 @@ class EngineOrder:
             out[..., :3] = linear - cross(angular, np.broadcast_to(base.T_base_frame[:3, 3], angular.shape))
         return out
 
-    @cached_property
-    def _own(self) -> list[int]:
-        """Numbers of the joints that have a coordinate in the model, in its order."""
-        number = {name: k for k, name in enumerate(self.joint_names)}
-        return [number[name] for name in self.model.joint_names]
+    def _own(self, of: Literal["q", "v"]) -> list[int]:
+        """Return the numbers, among the entries of all joints in q or in v, of those that the model has, in
+        its order."""
+        first: dict[str, int] = {}
+        count = 0
+        for name in self.joint_names:
+            first[name] = count
+            count += self._entries(name, of)
+        return [first[name] + k for name in self.model.joint_names for k in range(self._entries(name, of))]
+
+    def _entries(self, name: str, of: Literal["q", "v"]) -> int:
+        """Return the number of entries of a joint, of those that the file has move: four or three of a ball
+        joint."""
+        is_ball = self.model.joint(name).type == "ball"
+        return (4 if of == "q" else 3) if is_ball else 1
 
     @cached_property
-    def _couplings(self) -> tuple[Array, Floats, Floats]:
-        """Index in dynx's q, scale and offset, of which each joint's position follows; the index -1 is that
-        of `_padded`, for locked joints."""
+    def _position_couplings(self) -> tuple[Array, Floats, Floats]:
+        return self._couplings("q")
+
+    @cached_property
+    def _rate_couplings(self) -> tuple[Array, Floats, Floats]:
+        return self._couplings("v")
+
+    def _couplings(self, of: Literal["q", "v"]) -> tuple[Array, Floats, Floats]:
+        """Return index in dynx's q or v, scale and offset, from which each entry of the joints follows.
+
+        The index -1 is that of `_padded`, for locked joints.
+        """
+        index = self.model.position_index if of == "q" else self.model.coordinate_index
         rows = []
         for name in self.joint_names:
             joint = self.model.joint(name)
             if joint.mimic is not None:
-                driver = self.model.position_index(joint.mimic.joint)
-                rows.append((driver, joint.mimic.multiplier, joint.mimic.offset))
+                multiplier = joint.mimic.multiplier
+                driver = index(joint.mimic.joint) if of == "q" or multiplier else -1
+                rows.append((driver, multiplier, joint.mimic.offset))
             elif joint.moves:
-                rows.append((self.model.position_index(name), 1.0, 0.0))
+                rows += [(index(name) + k, 1.0, 0.0) for k in range(self._entries(name, of))]
             else:
                 rows.append((-1, 0.0, joint.locked_at or 0.0))
         source, scale, offset = zip(*rows, strict=True) if rows else ((), (), ())

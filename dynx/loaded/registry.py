@@ -77,8 +77,10 @@ def load_as(
             f"no file {shown(path)}; wanted the path of a file in URDF, MJCF or SDF, which "
             f"{shown(engine)} loads itself"
         )
-    refuse_ball_joints(model, "the comparison of files as engines load them")
-    return loader_class(engine)(file, model, calls)
+    loader = loader_class(engine)
+    if model.ball_joints and not loader.takes_ball_joints:
+        refuse_ball_joints(model, f"the comparison of files as {shown(engine)} loads them")
+    return loader(file, model, calls)
 
 
 def _is_installed(engine: str) -> bool:

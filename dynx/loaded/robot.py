@@ -97,11 +97,12 @@ class EngineCoordinates:
     n_velocities: int
     """Length of the v of the engine."""
     joints_q: tuple[int, ...]
-    """Index in q of each joint, in the order of `Model.joint_names`."""
+    """Index in q of each position of the joints, in the order of `Model.position_names`: one of a joint, and
+    four of a ball joint."""
     joints_v: tuple[int, ...]
-    """Index in v of each joint."""
+    """Index in v of each coordinate of the joints, in the order of `Model.coordinate_names`."""
     circles: tuple[bool, ...]
-    """Whether q has the cosine and sine of the angle of each joint."""
+    """Whether q has the cosine and sine of the angle, for each position of the joints."""
     base: EngineBase | None = None
 
 
@@ -126,6 +127,9 @@ class LoadedRobot(ABC):
     name: ClassVar[str]
     """Name of the engine: ``pinocchio``, ``pybullet``, ``mujoco``, ``drake``; of a loading variant, another
     documented call of an engine, ``ENGINE:VARIANT``, such as ``pybullet:plain``."""
+
+    takes_ball_joints: ClassVar[bool] = False
+    """True for an engine whose coordinates of ball joints are known; others refuse such robots."""
 
     FORMATS: ClassVar[tuple[Format, ...]] = ("urdf",)
     """Formats of the files that the engine, as it is installed, loads by itself."""

@@ -385,9 +385,7 @@ def test_the_stepper_of_mujoco_is_a_plant(base: str) -> None:
 def test_coefficients_of_each_axis_are_refused_by_an_engine() -> None:
     pytest.importorskip("mujoco")
     model = arm()
-    with pytest.raises(
-        UnsupportedFeatureError, match="'shoulder' of arm is a ball joint, of which an"
-    ):
+    with pytest.raises(UnsupportedFeatureError, match="'shoulder' of arm is a ball joint, of which an"):
         dynx.simulate(
             model,
             duration=0.01,

@@ -313,6 +313,7 @@ class LoadedMujoco(LoadedRobot):
     """A robot as `mujoco.MjModel.from_xml_path` loads it; see `LoadedRobot`."""
 
     name: ClassVar[str] = "mujoco"
+    takes_ball_joints: ClassVar[bool] = True
     FORMATS: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")
     CALLS: ClassVar[Mapping[str, str]] = CALLS
     refuses_without: ClassVar[tuple[str, ...]] = ("collision",)
@@ -329,8 +330,20 @@ class LoadedMujoco(LoadedRobot):
         joints = [self._joint(name) for name in model.joint_names]
         base = 6 if model.floating else 0
         # Indices of dynx's coordinates among MuJoCo's; the free joint comes first in both.
-        self._q = [int(loaded.jnt_qposadr[joint]) for joint in joints]
-        self._v = [*range(base), *(int(loaded.jnt_dofadr[joint]) for joint in joints)]
+        # The quaternion of a ball joint is (w, x, y, z) in MuJoCo.
+        ball = int(mujoco.mjtJoint.mjJNT_BALL)
+        is_ball = [int(loaded.jnt_type[joint]) == ball for joint in joints]
+        self._q = [
+            int(loaded.jnt_qposadr[joint]) + k
+            for joint, turns in zip(joints, is_ball, strict=True)
+            for k in ((1, 2, 3, 0) if turns else (0,))
+        ]
+        rates = [
+            int(loaded.jnt_dofadr[joint]) + k
+            for joint, turns in zip(joints, is_ball, strict=True)
+            for k in range(3 if turns else 1)
+        ]
+        self._v = [*range(base), *rates]
         self._data = mujoco.MjData(loaded)
 
     @classmethod
@@ -491,8 +504,10 @@ class LoadedMujoco(LoadedRobot):
 
     def _joint(self, name: str) -> int:
         number = self._numbers[1].get(name, -1)
-        single = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-        if number < 0 or self._loaded.jnt_type[number] not in [int(kind) for kind in single]:
+        kinds = [mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE]
+        if self._model.joint(name).type == "ball":
+            kinds = [mujoco.mjtJoint.mjJNT_BALL]
+        if number < 0 or self._loaded.jnt_type[number] not in [int(kind) for kind in kinds]:
             instead = "not there" if number < 0 else "of several degrees of freedom"
             raise lacking_joints(self.name, self._model, {name: instead})
         return number
