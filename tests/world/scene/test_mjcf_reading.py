@@ -467,7 +467,6 @@ def test_keyframes_of_an_aligned_free_body_are_named() -> None:
     ("old", "new", "named"),
     [
         ('<freejoint/><geom size="0.1"/>', '<freejoint/><geom type="sdf" mass="1"/>', "signed distance"),
-        ('<joint name="hinge"', '<joint name="hinge" type="ball"', "hinge"),
         ("<freejoint/>", '<freejoint/><joint name="second"/>', "ball"),
         ("</mujoco>", '<equality><weld body1="bal"/></equality></mujoco>', "ball"),
         ("</mujoco>", '<equality><weld site1="s" site2="t"/></equality></mujoco>', "site"),
