@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.model import configuration, topology
-from dynx.model.elements import IDENTITY, Actuator, Frame, Joint, Link, Note, Pose, checked_pose
+from dynx.model.elements import IDENTITY, Actuator, Joint, Link, Note, Pose, checked_pose
 from dynx.model.geometry.links import ContactFilter, Geometry
 from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.model.numbers import checked_gravity
+from dynx.model.package_search import StrPath
 from dynx.model.topology import refuse_unbounded_numbers
 from dynx.model.tree import NO_GEOMETRY, STANDARD_GRAVITY, Base, Tree, checked_base
 from dynx.registry import door, explains_names
@@ -153,19 +154,13 @@ class Model(Tree):
         """Return the same robot with another gravity (3,) [m/s^2]."""
         return replace(self, gravity=checked_gravity(gravity))
 
-    @checks_types
+    @door("dynx.model.added_frames:with_frame")
     def with_frame(self, name: str, link: str, placement: Pose | ArrayLike = IDENTITY) -> Model:
-        """Return the same robot with one more named frame, fixed to `link` (such as a tool tip).
+        """Return the same robot with one more named frame, fixed to `link` (a tool tip, say).
 
         `placement` is the pose of the frame in the link: a `Pose`, or a matrix T_link_frame (4, 4).
         """
-        self.link(link)
-        if not isinstance(name, str) or not name:
-            raise ArgumentError(f"a frame's name is {shown(name)}; wanted a str that is not empty")
-        placement = checked_pose("placement", placement)
-        if name in self._frame_index:
-            raise ArgumentError(f"frame {shown(name)} exists already in {self.name}")
-        return replace(self, extra_frames=(*self.extra_frames, Frame(name, link, placement)))
+        raise NotImplementedError
 
     @door("dynx.model.named_configurations:with_configuration")
     def with_configuration(self, name: str, q: ArrayLike) -> Model:
@@ -173,6 +168,11 @@ class Model(Tree):
 
         `to_mjcf` writes it as a keyframe. Raises ArgumentError for a name that is taken.
         """
+        raise NotImplementedError
+
+    @door("dynx.model.srdf:with_group_states")
+    def with_group_states(self, srdf: StrPath | bytes) -> Model:
+        """Return the same robot with the group states of an SRDF file or text as named configurations."""
         raise NotImplementedError
 
     @door("dynx.viewer.viewer:view")

@@ -27,7 +27,7 @@ _BY_SUFFIX = {
     ".mjcf": _MJCF,
     ".toml": "a scene, or settings; dynx.world.read_scene(file) reads a scene",
     ".json": "a scene, or another document; dynx.world.read_scene(file) reads a scene",
-    ".srdf": "SRDF, which has groups of joints and no robot",
+    ".srdf": "SRDF, which has groups of joints and no robot; Model.with_group_states reads its states",
     **dict.fromkeys((".stl", ".obj", ".dae", ".ply", ".gltf", ".glb"), _MESH),
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _USD),
 }

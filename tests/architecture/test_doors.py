@@ -20,6 +20,8 @@ DOORS = {
     "dynx.backends.base:Backend.velocity_ik": "dynx.ik.velocity:velocity_ik",
     "dynx.model.model:Model.order_of": "dynx.loaded.order:order_of",
     "dynx.model.model:Model.with_configuration": "dynx.model.named_configurations:with_configuration",
+    "dynx.model.model:Model.with_frame": "dynx.model.added_frames:with_frame",
+    "dynx.model.model:Model.with_group_states": "dynx.model.srdf:with_group_states",
     "dynx.model.model:Model._repr_html_": "dynx.model.model_page:model_page",
     "dynx.model.tree:Tree._initial_configuration": "dynx.model.named_configurations:initial_configuration",
     "dynx.model.tree:Tree._named_configurations": "dynx.model.named_configurations:named_configurations",
