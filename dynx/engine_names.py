@@ -15,7 +15,7 @@ from dynx import errors
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.errors import nearest, shown
 
-_JOINT_LIMITS = "Model.joint(name), with limits, axis and dynamics"
+_JOINT_LIMITS = "Model.joint(name), which has limits, axis and dynamics"
 _MOTORS = (
     "World.step(motors={robot: dynx.PDMotor(...)}), or with TorqueMotor, PositionMotor or VelocityMotor; "
     "World.step(torques={robot: tau}); in dynx.simulate a controller of dynx.control, such as OpenLoop with "
@@ -33,7 +33,7 @@ _WHOLE_STEP = "World.step(torques={robot: tau}), which does mj_step1 and mj_step
 _FILES = "dynx.load(path) for a robot in URDF or xacro, and dynx.world.read_scene(path) for a scene"
 _SAVE = "World.save(), or World.write(path) for a file"
 _CLOSE = "World.close(), or a with block"
-_START = "World(scene, engine='pybullet'), without a window; World.view shows it"
+_START = "World(scene, engine='pybullet'), without a window; World.view shows the world"
 _SETTINGS = "an argument of World(scene, ...), such as `dt`, `substeps` or a setting of the engine"
 _LOADED = "dynx.load(path)"
 _EULER = "roll, pitch, yaw [rad]"
@@ -70,7 +70,7 @@ PYBULLET = {
     "getCameraImage": _CAMERA,
     "getClosestPoints": "World.closest_points(a, b)",
     "getContactPoints": "World.contacts(part)",
-    "getDynamicsInfo": "Model.link(name), with its inertial",
+    "getDynamicsInfo": "Model.link(name), which has the inertial data of the link",
     "getEulerFromQuaternion": f"dynx.rpy_from_quat(quat_xyzw): {_EULER}",
     "getJointInfo": _JOINT_LIMITS,
     "getJointState": f"{_STATE}; Backend.joint_wrenches(q, v, a) for the reaction force",
@@ -108,8 +108,8 @@ PYBULLET = {
     "saveState": _SAVE,
     "setAdditionalSearchPath": "dynx.load(path, package_dirs=[...]); dynx.load('r2d2.urdf') finds this "
     "file of pybullet_data without `package_dirs`",
-    "setCollisionFilterGroupMask": "Scene.ignored, pairs of parts that do not touch",
-    "setCollisionFilterPair": "Scene.ignored, pairs of parts that do not touch",
+    "setCollisionFilterGroupMask": "Scene.ignored, the pairs of parts that do not collide",
+    "setCollisionFilterPair": "Scene.ignored, the pairs of parts that do not collide",
     "setGravity": "`gravity=(0, 0, -9.81)`, an argument of Scene and of dynx.load",
     "setJointMotorControl": _MOTORS,
     "setJointMotorControl2": _MOTORS,
@@ -139,13 +139,13 @@ PINOCCHIO = {
     ),
     "computeFrameJacobian": f"Backend.jacobian(q, frame, reference='local') {_LOCAL}, the default of "
     "Pinocchio",
-    "computeJointJacobian": "Backend.jacobian(q, link, reference='local') of the child link",
-    "computeJointJacobians": "Backend.jacobian(q, link, reference='world') of each child link",
+    "computeJointJacobian": "Backend.jacobian(q, link, reference='local') for the child link of the joint",
+    "computeJointJacobians": "Backend.jacobian(q, link, reference='world') for the child link of each joint",
     "computeMinverse": "numpy.linalg.inv(Backend.mass_matrix(q)); for the acceleration itself, "
     "Backend.forward_dynamics(q, v, tau)",
     "computeRNEADerivatives": "dynx.Derivatives",
     "computeSupportedForceByFrame": (
-        "Backend.joint_wrenches(q, v, a), which includes the child body of the joint"
+        "Backend.joint_wrenches(q, v, a), which includes the load of the child body of the joint"
     ),
     "computeTotalMass": "Model.total_mass",
     "difference": "Model.difference(q0, q1)",
@@ -160,7 +160,8 @@ PINOCCHIO = {
     "Pinocchio",
     "getJointId": "no such call, because calls of dynx take the name of a joint; Model.joint_names lists the "
     "names",
-    "getJointJacobian": f"Backend.jacobian(q, link, reference='local') of the child link, {_LOCAL}",
+    "getJointJacobian": "Backend.jacobian(q, link, reference='local') for the child link of the joint and "
+    "`pin.LOCAL`",
     "integrate": "Model.integrate(q, v)",
     "neutral": "Model.neutral()",
     "randomConfiguration": "Model.random(rng)",
@@ -174,7 +175,7 @@ MUJOCO = {
     "MjModel": f"{_LOADED} for a robot; for a scene World(scene, engine='mujoco'), where `scene` is "
     "dynx.world.read_scene(path)",
     "mj_applyFT": _FORCE,
-    "mj_contactForce": "World.contacts(part), each with its force",
+    "mj_contactForce": "World.contacts(part), which returns contacts with their forces",
     "mj_crb": _WITH_ARMATURE,
     "mj_differentiatePos": "Model.difference(q0, q1)",
     "mj_energyPos": "Backend.potential_energy(q, joint_dynamics=True)",
