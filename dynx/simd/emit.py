@@ -32,8 +32,15 @@ from dynx.simd.rows import (
     scratch_functions,
     store_column,
 )
-from dynx.simd.schedule import ELEMENTARY, Segment, TrigGroup, schedule, spill_slots
-from dynx.simd.streaming import Streaming
+from dynx.simd.schedule import (
+    CACHE_LINE,
+    ELEMENTARY,
+    Segment,
+    TrigGroup,
+    schedule,
+    spill_slots,
+    streamed_outputs,
+)
 from dynx.simd.target import Processor
 from dynx.simd.trigonometry import declarations, replacements, sines_and_cosines
 from dynx.simd.verify import check_schedule
@@ -54,9 +61,6 @@ PREFETCH_TO_READ, PREFETCH_TO_WRITE = "i32 0, i32 2", "i32 1, i32 3"
 """Hints of LLVM's prefetch: whether the memory will be written, and how near the processor it shall be."""
 
 DECLARED_PREFETCH = "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)"
-
-CACHE_LINE = 64
-"""Size of a cache line [bytes]."""
 
 MAX_OPTIMISED_LENGTH = 16_000
 """Length of a program above which LLVM does not optimise it. Optimising takes some 0.2 ms for each operation,
@@ -175,12 +179,16 @@ def _module(functions: Sequence[str], target: Processor, settings: Settings) -> 
 def _loop(program: Program, settings: Settings, segments: Sequence[Segment], slots: int) -> str:
     """Return the entry function, a loop over groups of `lanes` samples, of which the last may overlap; and
     what it needs to stream rows of results."""
-    lanes, streaming = settings.lanes, Streaming(program, settings.lanes)
+    lanes, streaming = settings.lanes, None
+    if streamed_outputs(program, lanes):
+        from dynx.simd.streaming import Streaming
+
+        streaming = Streaming(program, lanes)
     called = _called(len(segments), settings)
     constant = [] if settings.quick else [f"segment{k}" for k, each in enumerate(segments) if each.constant]
-    words, start = ("%words", "begin") if streaming.arrays else ("%arguments", "entry")
+    words, start = ("%words", "begin") if streaming else ("%arguments", "entry")
     lines = [
-        *streaming.functions(),
+        *(streaming.functions() if streaming else ()),
         f"define void @{ENTRY}(ptr noalias nocapture readonly %arguments) {{",
         "entry:",
         f"  %kept = alloca [{slots} x <{lanes} x double>], align 64",
@@ -188,24 +196,24 @@ def _loop(program: Program, settings: Settings, segments: Sequence[Segment], slo
         f"  %last = sub i64 %n, {lanes}",
         *prefetch_pointers(program.inputs, program.outputs),
         *([f"  call void @{FILL}(ptr %kept)"] if settings.quick else []),
-        *streaming.begin(constant),
+        *(streaming.begin(constant) if streaming else ()),
         "  br label %group",
         "group:",
-        f"  %i = phi i64 [0, %{start}], [%next, %{'grouped' if streaming.arrays else 'group'}]",
+        f"  %i = phi i64 [0, %{start}], [%next, %{'grouped' if streaming else 'group'}]",
         "  %late = icmp sgt i64 %i, %last",
         "  %first = select i1 %late, i64 %last, i64 %i",
     ]
     lines += prefetch(program.inputs, program.outputs, lanes)
-    lines += streaming.before_group()
+    lines += streaming.before_group() if streaming else []
     varying = [name for name in called if name not in constant]
     lines += [f"  call void @{name}(ptr {words}, i64 %first, ptr %kept)" for name in varying]
-    lines += streaming.after_group(constant)
+    lines += streaming.after_group(constant) if streaming else []
     lines += [
         f"  %next = add i64 %i, {lanes}",
         "  %more = icmp slt i64 %next, %n",
         "  br i1 %more, label %group, label %done",
         "done:",
-        *streaming.end(),
+        *(streaming.end() if streaming else ()),
         "  ret void",
         "}",
     ]

@@ -71,7 +71,9 @@ def compile_text(text: str, target: Processor, *, quick: bool = False) -> bytes:
 
     Raises CompileError if LLVM rejects it.
     """
-    with COMPILE_LOCK:
+    from dynx.simd.operation_order import in_order_of_text
+
+    with COMPILE_LOCK, in_order_of_text(target):
         try:
             return bytes(target.machine(quick=quick).emit_object(binding.parse_assembly(text)))
         except RuntimeError as error:

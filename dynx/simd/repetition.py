@@ -52,7 +52,7 @@ SEGMENT = 12_000
 """Length of the segments (`dynx.simd.emit`). A long one takes a tenth more time to compile than short ones,
 and the code is a fifth faster, because fewer values go through memory."""
 
-RELOADED_AFTER = 400
+RELOADED_AFTER = 100
 """Lines of code after which a value that is kept in memory is read from there again. The compiler would keep
 it on the stack as well, and both together exceed the first-level cache."""
 
@@ -223,7 +223,7 @@ class _Tracer:
 
 
 @dataclass(frozen=True)
-class _Layout:
+class _PortSlots:
     """Places of the ports: numbers of arrays, and slots of vectors in memory."""
 
     arrays: dict[str, int]
@@ -231,7 +231,7 @@ class _Layout:
     size: int
 
     @classmethod
-    def of(cls, repetition: Repetition) -> _Layout:
+    def of(cls, repetition: Repetition) -> _PortSlots:
         arrays = {port.name: k for k, port in enumerate(repetition.inputs)}
         slots: dict[str, int] = {}
         size = 0
@@ -313,7 +313,7 @@ class _PartBody(SegmentBody):
 
 def emit_repetition(repetition: Repetition, target: Processor, settings: Settings) -> list[str]:
     """Return the texts of LLVM modules that evaluate a repetition together."""
-    layout = _Layout.of(repetition)
+    layout = _PortSlots.of(repetition)
     bodies: list[str] = []
     calls: list[list[int]] = []
     size = layout.size
@@ -350,7 +350,7 @@ def emit_repetition(repetition: Repetition, target: Processor, settings: Setting
 
 
 def _places(
-    ports: Sequence[Port], layout: _Layout, inputs: Sequence[Port], *, arrays: bool
+    ports: Sequence[Port], layout: _PortSlots, inputs: Sequence[Port], *, arrays: bool
 ) -> Iterator[tuple[bool, int]]:
     names = {port.name for port in inputs} if arrays else set[str]()
     for port in ports:

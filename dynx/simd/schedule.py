@@ -10,9 +10,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from dynx.simd.program import Program, scalar_ranges
+from dynx.simd.program import Port, Program, scalar_ranges
 from dynx.simd.rows import tiles
-from dynx.simd.streaming import streamed_outputs
 
 TRIG = frozenset({"sin", "cos"})
 ELEMENTARY = frozenset({"exp", "tanh", "arctan"})
@@ -29,6 +28,15 @@ compile as thousands of operations."""
 
 MAX_ANGLES = 24
 """Most angles of one group; a group is compiled in one piece."""
+
+CACHE_LINE = 64
+"""Size of a cache line [bytes]."""
+
+MIN_COLUMNS = 129
+"""Least row length of a streamed array; shorter rows are prefetched (`dynx.simd.emit`)."""
+
+MAX_BLOCK = 192 * 1024
+"""Largest size of the rows of a group [bytes], which must fit into the second-level cache."""
 
 
 class TrigGroup(NamedTuple):
@@ -193,3 +201,19 @@ def _used_values(program: Program, segment: Segment) -> Iterator[int]:
         yield from step.angles if isinstance(step, TrigGroup) else program.nodes[step].args
     for store in segment.stores:
         yield from store.nodes
+
+
+def streamed_outputs(program: Program, lanes: int) -> list[int]:
+    """Return the numbers of the outputs whose rows are streamed in large batches."""
+    found, room = [], MAX_BLOCK
+    for number, port in enumerate(program.outputs):
+        size = block_size(port, lanes)
+        if port.size >= MIN_COLUMNS and size <= room:
+            found.append(number)
+            room -= size
+    return found
+
+
+def block_size(port: Port, lanes: int) -> int:
+    """Return the size of the rows of a group, which end with a cache line [bytes]."""
+    return -(-8 * port.size * lanes // CACHE_LINE) * CACHE_LINE

@@ -15,38 +15,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from dynx.simd.program import Port, Program
-
-MIN_COLUMNS = 129
-"""Least row length of a streamed array; shorter rows are prefetched (`dynx.simd.emit`)."""
-
-MAX_BLOCK = 192 * 1024
-"""Largest size of the rows of a group [bytes], which must fit into the second-level cache."""
+from dynx.simd.program import Program
+from dynx.simd.schedule import CACHE_LINE, block_size, streamed_outputs
 
 MIN_STREAMED = 8 * 1024 * 1024
 """Least size of the results of a call that are streamed [bytes]: more than one core's share of the caches."""
 
 COPY = "stream_rows"
 """Name of the function that copies the rows of a group."""
-
-_LINE = 64
-"""Size of a cache line [bytes]."""
-
-
-def streamed_outputs(program: Program, lanes: int) -> list[int]:
-    """Return the numbers of the outputs whose rows are streamed in large batches."""
-    found, room = [], MAX_BLOCK
-    for number, port in enumerate(program.outputs):
-        size = _block_size(port, lanes)
-        if port.size >= MIN_COLUMNS and size <= room:
-            found.append(number)
-            room -= size
-    return found
-
-
-def _block_size(port: Port, lanes: int) -> int:
-    """Return the size of the rows of a group, which end with a cache line [bytes]."""
-    return -(-8 * port.size * lanes // _LINE) * _LINE
 
 
 class StreamedArray(NamedTuple):
@@ -61,7 +37,7 @@ class StreamedArray(NamedTuple):
 
 
 class Streaming:
-    """The streamed outputs of a program; none if all its rows are short."""
+    """The streamed outputs of a program."""
 
     def __init__(self, program: Program, lanes: int) -> None:
         self.arrays: list[StreamedArray] = []
@@ -71,7 +47,7 @@ class Streaming:
         for output in streamed_outputs(program, lanes):
             port = program.outputs[output]
             self.arrays.append(StreamedArray(len(program.inputs) + output, 8 * port.size, self._block))
-            self._block += _block_size(port, lanes)
+            self._block += block_size(port, lanes)
 
     def begin(self, constant_rows: Sequence[str]) -> list[str]:
         """Return the code that decides whether results are streamed, as %streams, and prepares that.
@@ -79,11 +55,9 @@ class Streaming:
         It calls `constant_rows`, functions that store what all samples have in common. The code of a group
         takes %words, its arguments.
         """
-        if not self.arrays:
-            return []
         samples, copied = -(-MIN_STREAMED // sum(array.row for array in self.arrays)), 8 * self._words
         return [
-            f"  %block = alloca [{self._block} x i8], align {_LINE}",
+            f"  %block = alloca [{self._block} x i8], align {CACHE_LINE}",
             f"  %changed = alloca [{self._words} x i64], align 8",
             f"  call void @llvm.memcpy.p0.p0.i64(ptr %changed, ptr %arguments, i64 {copied}, i1 false)",
             f"  %streams = icmp sge i64 %n, {samples}",
@@ -124,8 +98,6 @@ class Streaming:
 
     def after_group(self, constant_rows: Sequence[str]) -> list[str]:
         """Return the code after a group: it copies the rows, or stores what all samples have in common."""
-        if not self.arrays:
-            return []
         lines = ["  br i1 %streams, label %copy, label %complete", "copy:"]
         for k, row, _ in self.arrays:
             lines += [
@@ -145,11 +117,11 @@ class Streaming:
     def end(self) -> list[str]:
         """Return the code after all groups."""
         # Later stores and other threads see stores past the caches only after a fence.
-        return ["  fence seq_cst"] if self.arrays else []
+        return ["  fence seq_cst"]
 
     def functions(self) -> list[str]:
-        """Return the text of the function that copies rows, if it is needed."""
-        return [_copy(self._lanes)] if self.arrays else []
+        """Return the text of the function that copies rows."""
+        return [_copy(self._lanes)]
 
 
 def _copy(lanes: int) -> str:
@@ -157,7 +129,7 @@ def _copy(lanes: int) -> str:
 
     Two halves of the memory are written in turn, which is a fifth faster than one line after another.
     """
-    line = f"<{_LINE // 8} x double>"
+    line = f"<{CACHE_LINE // 8} x double>"
     return "\n".join(
         [
             f"define internal void @{COPY}(ptr %to, i64 %stride, ptr noalias %from, i64 %row) noinline {{",
@@ -175,10 +147,10 @@ def _copy(lanes: int) -> str:
             "  %source = getelementptr i8, ptr %from, i64 %from_offset",
             "  %address = ptrtoint ptr %target to i64",
             "  %below = sub i64 0, %address",
-            f"  %head = and i64 %below, {_LINE - 1}",
+            f"  %head = and i64 %below, {CACHE_LINE - 1}",
             "  %rest = sub i64 %size, %head",
-            f"  %half_lines = lshr i64 %rest, {(2 * _LINE).bit_length() - 1}",
-            f"  %half = mul i64 %half_lines, {_LINE}",
+            f"  %half_lines = lshr i64 %rest, {(2 * CACHE_LINE).bit_length() - 1}",
+            f"  %half = mul i64 %half_lines, {CACHE_LINE}",
             "  %lines = mul i64 %half, 2",
             "  %tail = add i64 %head, %lines",
             "  br label %odd",
@@ -210,9 +182,9 @@ def _copy(lanes: int) -> str:
             ),
             f"  %one = load {line}, ptr %one_source, align 8",
             f"  %other = load {line}, ptr %other_source, align 8",
-            f"  store {line} %one, ptr %one_target, align {_LINE}, !nontemporal !1",
-            f"  store {line} %other, ptr %other_target, align {_LINE}, !nontemporal !1",
-            f"  %i_next = add i64 %i, {_LINE}",
+            f"  store {line} %one, ptr %one_target, align {CACHE_LINE}, !nontemporal !1",
+            f"  store {line} %other, ptr %other_target, align {CACHE_LINE}, !nontemporal !1",
+            f"  %i_next = add i64 %i, {CACHE_LINE}",
             "  %line_end = add i64 %head, %half",
             "  %more_lines = icmp ult i64 %i_next, %line_end",
             "  br i1 %more_lines, label %line, label %lines_done",

@@ -68,6 +68,11 @@ def compiler_version() -> str:
     return f"llvmlite {llvmlite.__version__}, LLVM {'.'.join(map(str, binding.llvm_version_info))}"
 
 
+def set_llvm_option(option: str) -> None:
+    """Set an option of LLVM's command line for the whole process."""
+    binding.set_option("dynx", option)
+
+
 @cache
 def _initialise() -> None:
     binding.initialize_native_target()

@@ -10,7 +10,8 @@ import pytest
 import dynx.simd.streaming
 from dynx.simd.emit import Settings
 from dynx.simd.program import Program
-from dynx.simd.streaming import MAX_BLOCK, MIN_COLUMNS, Streaming, streamed_outputs
+from dynx.simd.schedule import MAX_BLOCK, MIN_COLUMNS, streamed_outputs
+from dynx.simd.streaming import Streaming
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats
 from tests.simd.machine import LANES, TARGETS, Machine, same_bits
