@@ -7,15 +7,16 @@ from typing import NamedTuple
 
 from dynx.distance.box_separation import box_separation
 from dynx.distance.contact_reduction import TIE, ContactCandidate, largest, reduced
-from dynx.distance.cores import BoxCore, CylinderCore, EllipsoidCore, HullCore, PointCore, SegmentCore
+from dynx.distance.cores import BoxCore, Core, CylinderCore, EllipsoidCore, HullCore, PointCore, SegmentCore
 from dynx.distance.distance import distance_of_cores
 from dynx.distance.field_contacts import field_candidates
-from dynx.distance.overlap_polygon import INSIDE, NEAREST, overlap
+from dynx.distance.overlap_polygon import NEAREST, PARALLEL_SINE, overlap
 from dynx.distance.placed_solids import PlacedSolid, placed_cores
 from dynx.distance.plane_contacts import plane_candidates
+from dynx.distance.separating_axes import best_axis, tangent_radius
 from dynx.distance.support_features import ContactFrame, SupportFeature, frame_along, support_feature
 from dynx.errors import ArgumentError
-from dynx.spatial.plain import Vector3, dot
+from dynx.spatial.plain import Vector3, cross, dot, minus
 
 SAME_NORMAL = 1.0 - 1e-6
 """Cosine of the angle between two normals from which a ground counts as one plane."""
@@ -23,7 +24,7 @@ SAME_NORMAL = 1.0 - 1e-6
 VALLEY = 2**70
 """Difference of the numbers of contact points of one vertex with two slopes."""
 
-MARGIN = 1e-7
+MARGIN = 1e-8
 """Distance outside of a feature, relative to the size of the shapes, that counts as inside."""
 
 
@@ -51,8 +52,9 @@ class ContactPoint(NamedTuple):
 def contact_points(a: PlacedSolid, b: PlacedSolid, within: float, limit: int = 4) -> tuple[ContactPoint, ...]:
     """Return the contact points of two shapes whose gap is at most `within` [m], at most `limit` of them.
 
-    The least gap is the signed distance of the shapes. Of more points, those of the largest area remain, and
-    the deepest one. Raises ArgumentError for two grounds (planes, height fields), and for a limit below 1.
+    The least gap is the signed distance of the shapes, to 1e-8 of their size. Of more points, those of the
+    largest area remain, and the deepest one. Raises ArgumentError for two grounds (planes, height fields),
+    and for a limit below 1.
     """
     if limit < 1:
         raise ArgumentError(f"limit is {limit}; wanted at least 1 contact point")
@@ -95,7 +97,7 @@ def _in_order(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tupl
         normal, found, size = plane_candidates(a, b, within)
         return _contacts(reduced(found, limit, size), normal)
     if isinstance(core_a, PointCore) and isinstance(core_b, PointCore):
-        return _of_points((a.p, core_a.radius, 0), (b.p, core_b.radius, 0), within)
+        return _of_points((a.p, core_a.radius, 0), (b.p, core_b.radius, 0), within, b.axes[2])
     if isinstance(core_a, PointCore | SegmentCore) and isinstance(core_b, SegmentCore):
         return _of_capsules(a, b, within, limit)
     if isinstance(core_a, BoxCore) and isinstance(core_b, BoxCore):
@@ -108,9 +110,10 @@ def _contacts(candidates: list[ContactCandidate], normal: Vector3) -> tuple[Cont
 
 
 def _of_points(
-    a: tuple[Vector3, float, int], b: tuple[Vector3, float, int], within: float
+    a: tuple[Vector3, float, int], b: tuple[Vector3, float, int], within: float, fallback: Vector3
 ) -> tuple[ContactPoint, ...]:
-    """Return the contact point of two balls: centre, radius, and number of the feature of each."""
+    """Return the contact point of two balls: centre, radius, and number of the feature of each; along
+    `fallback` for one centre."""
     (ax, ay, az), radius_a, part_a = a
     (bx, by, bz), radius_b, part_b = b
     x, y, z = ax - bx, ay - by, az - bz
@@ -118,7 +121,7 @@ def _of_points(
     gap = length - radius_a - radius_b
     if gap > within:
         return ()
-    x, y, z = (x / length, y / length, z / length) if length > 0.0 else (0.0, 0.0, 1.0)
+    x, y, z = (x / length, y / length, z / length) if length > 0.0 else fallback
     on_a = ax - radius_a * x, ay - radius_a * y, az - radius_a * z
     on_b = bx + radius_b * x, by + radius_b * y, bz + radius_b * z
     return (ContactPoint(on_a, on_b, (x, y, z), gap, (part_a, part_b)),)
@@ -126,54 +129,46 @@ def _of_points(
 
 def _of_capsules(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tuple[ContactPoint, ...]:
     """Return the contact points of two capsules, or of a ball and a capsule: at the nearest points of the
-    axes, and at the ends beside which the other axis runs."""
+    axes, or at both ends of the stretch along which nearly parallel axes are beside each other."""
     core_a, core_b = a.solid.core, b.solid.core
     assert isinstance(core_a, PointCore | SegmentCore)
     assert isinstance(core_b, SegmentCore)
     half_a = core_a.half if isinstance(core_a, SegmentCore) else 0.0
     half_b = core_b.half
-    (ax, ay, az), (bx, by, bz) = a.axes[2], b.axes[2]
-    x, y, z = a.p[0] - b.p[0], a.p[1] - b.p[1], a.p[2] - b.p[2]
-    cosine = ax * bx + ay * by + az * bz
-    along_a, along_b = -(x * ax + y * ay + z * az), x * bx + y * by + z * bz
-    # Pairs of places on both axes.
-    pairs: list[tuple[float, float, int, int]] = []
-    cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    square = cx * cx + cy * cy + cz * cz
-    if half_a > 0.0:
-        if square > 1e-16:
-            s = (along_a + cosine * along_b) / square
-            s = min(max(s, -half_a), half_a)
-        else:
-            s = min(max(along_a, -half_a), half_a)
-        t = min(max(along_b + cosine * s, -half_b), half_b)
-        s = min(max(along_a + cosine * t, -half_a), half_a)
-        ends = [(-half_a, 0), (half_a, 1)]
-        for s_end, k in ends:
-            t_end = along_b + cosine * s_end
-            if -half_b <= t_end <= half_b:
-                pairs.append((s_end, t_end, k, INSIDE))
-        for t_end, k in ((-half_b, 0), (half_b, 1)):
-            s_end = along_a + cosine * t_end
-            if -half_a <= s_end <= half_a:
-                pairs.append((s_end, t_end, INSIDE, k))
-    else:
-        s, t = 0.0, min(max(along_b, -half_b), half_b)
-    pairs.append((s, t, NEAREST, NEAREST))
-    found: list[ContactCandidate] = []
-    normals: dict[tuple[int, int], Vector3] = {}
-    for s, t, part_a, part_b in pairs:
-        on_a = a.p[0] + s * ax, a.p[1] + s * ay, a.p[2] + s * az
-        on_b = b.p[0] + t * bx, b.p[1] + t * by, b.p[2] + t * bz
-        for each in _of_points((on_a, core_a.radius, part_a), (on_b, core_b.radius, part_b), within):
-            if dot(each.normal, each.normal) > 0.0:
-                normals[each.feature] = each.normal
-                found.append(ContactCandidate(t, 0.0, each.gap, each.point_a, each.point_b, each.feature))
-    size = half_a + half_b + core_a.radius + core_b.radius
-    return tuple(
-        ContactPoint(c.point_a, c.point_b, normals[c.feature], c.gap, c.feature)
-        for c in reduced(found, min(limit, 2), size)
+    axis_a, axis_b = a.axes[2], b.axes[2]
+    between = minus(a.p, b.p)
+    cosine = dot(axis_a, axis_b)
+    along_a, along_b = -dot(between, axis_a), dot(between, axis_b)
+    across = cross(axis_a, axis_b)
+    square = dot(across, across)
+    # Places on both axes that are nearest to each other.
+    s = along_a if square < 1e-16 else (along_a + cosine * along_b) / square
+    s = min(max(s, -half_a), half_a)
+    t = min(max(along_b + cosine * s, -half_b), half_b)
+    s = min(max(along_a + cosine * t, -half_a), half_a)
+    length = math.sqrt(square)
+    fallback = (across[0] / length, across[1] / length, across[2] / length) if length > 1e-8 else b.axes[0]
+    found = _of_points(
+        (_beyond(a.p, s, axis_a), core_a.radius, NEAREST),
+        (_beyond(b.p, t, axis_b), core_b.radius, NEAREST),
+        within,
+        fallback,
     )
+    if not found or half_a == 0.0 or square > PARALLEL_SINE * PARALLEL_SINE:
+        return found
+    normal, gap = found[0].normal, found[0].gap
+    frame, size = frame_along(normal), half_a + half_b + core_a.radius + core_b.radius
+    candidates = candidates_of_features(*_features(a, b, between, frame), frame, b.p, within, size)
+    least = min((each.gap for each in candidates), default=math.inf)
+    if least > gap + TIE * size:
+        on_a = minus(found[0].point_a, b.p)
+        place = dot(frame.u, on_a), dot(frame.v, on_a)
+        candidates.insert(0, ContactCandidate(*place, gap, *found[0][:2], found[0].feature))
+    return _contacts(reduced(candidates, limit, size), normal)
+
+
+def _beyond(p: Vector3, s: float, axis: Vector3) -> Vector3:
+    return p[0] + s * axis[0], p[1] + s * axis[1], p[2] + s * axis[2]
 
 
 def _of_field(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tuple[ContactPoint, ...]:
@@ -214,7 +209,8 @@ def _of_boxes(
         return ()
     separation, normal = found
     size = core_a.extent + core_b.extent
-    candidates = _candidates(a, b, between, frame_along(normal), within, size)
+    frame = frame_along(normal)
+    candidates = candidates_of_features(*_features(a, b, between, frame), frame, b.p, within, size)
     # Separated boxes are farther apart than along each axis, unless two of their points show that distance.
     least = min((each.gap for each in candidates), default=math.inf)
     if separation > 0.0 and least > separation + TIE * size:
@@ -222,13 +218,11 @@ def _of_boxes(
     return _contacts(reduced(candidates, limit, size), normal)
 
 
-def _candidates(
-    a: PlacedSolid, b: PlacedSolid, between: Vector3, frame: ContactFrame, within: float, size: float
-) -> list[ContactCandidate]:
-    """Return the places of the features of two shapes at which the gap is at most `within`."""
-    feature_a = support_feature(a, between, frame, -1.0)
-    feature_b = support_feature(b, (0.0, 0.0, 0.0), frame, 1.0)
-    return candidates_of_features(feature_a, feature_b, frame, b.p, within, size)
+def _features(
+    a: PlacedSolid, b: PlacedSolid, between: Vector3, frame: ContactFrame
+) -> tuple[SupportFeature, SupportFeature]:
+    """Return the features of two shapes that face each other along a normal, about the origin of b."""
+    return support_feature(a, between, frame, -1.0), support_feature(b, (0.0, 0.0, 0.0), frame, 1.0)
 
 
 def candidates_of_features(
@@ -254,9 +248,61 @@ def candidates_of_features(
     return found
 
 
+def _faces(each: ContactCandidate, normal: Vector3, margin: float) -> bool:
+    """Check whether the points of a candidate are beside each other by no more than a margin."""
+    x, y, z = minus(each.point_a, each.point_b)
+    gap = each.gap
+    return math.hypot(x - gap * normal[0], y - gap * normal[1], z - gap * normal[2]) <= margin
+
+
+def _along_axis(
+    a: PlacedSolid,
+    core_a: Core,
+    b: PlacedSolid,
+    core_b: Core,
+    between: Vector3,
+    within: float,
+    size: float,
+) -> tuple[Vector3, list[ContactCandidate]] | None:
+    """Return the normal and the candidates where the best of some axes is proven to be the normal, with no
+    candidates if the shapes are farther apart than `within`; otherwise None."""
+    # The centre of a ball needs no proof: its nearest point is quickly found.
+    axis = None if isinstance(core_a, PointCore) else best_axis(core_a, core_b)
+    if axis is None:
+        return None
+    separation, normal = axis
+    gap = separation - core_a.radius - core_b.radius
+    if gap > within:
+        return normal, []
+    frame = frame_along(normal)
+    candidates = candidates_of_features(*_features(a, b, between, frame), frame, b.p, within, size)
+    deepest = [
+        each for each in candidates if each.gap <= gap + TIE * size and _faces(each, normal, MARGIN * size)
+    ]
+    if not deepest:
+        return None
+    if separation <= 0.0:
+        # The middle of all deepest points is deep, too, and farther from the outlines.
+        count, (x, y, z) = len(deepest), normal
+        u, v = sum(each.u for each in deepest) / count, sum(each.v for each in deepest) / count
+        below = min(dot(normal, minus(each.point_a, b.p)) for each in deepest)
+        above = max(dot(normal, minus(each.point_b, b.p)) for each in deepest)
+        core_a.place(a.R, between)
+        core_b.place(b.R, (0.0, 0.0, 0.0))
+        radius = tangent_radius(core_a, frame.point(u, v, below), (-x, -y, -z))
+        if radius + tangent_radius(core_b, frame.point(u, v, above), normal) < -separation:
+            return None
+    return normal, candidates
+
+
 def _of_convex(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tuple[ContactPoint, ...]:
     """Return the contact points of two bounded shapes by their distance and the features along its normal."""
     core_a, core_b, between = placed_cores(a, b)
+    size = core_a.extent + core_a.radius + core_b.extent + core_b.radius
+    found = _along_axis(a, core_a, b, core_b, between, within, size)
+    if found is not None:
+        normal, candidates = found
+        return _contacts(reduced(candidates, limit, size), normal)
     T_a, T_b = a.T, b.T
     T_a[:3, 3], T_b[:3, 3] = between, 0.0
     nearest = distance_of_cores(core_a, T_a, core_b, T_b, within)
@@ -264,17 +310,16 @@ def _of_convex(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tup
         return ()
     x, y, z = nearest.normal.tolist()
     normal = x, y, z
-    size = core_a.extent + core_a.radius + core_b.extent + core_b.radius
-    candidates: list[ContactCandidate] = []
+    frame = frame_along(normal)
+    candidates = []
     if not isinstance(core_a, _CURVED) and not isinstance(core_b, _CURVED):
-        candidates = _candidates(a, b, between, frame_along(normal), within, size)
+        candidates = candidates_of_features(*_features(a, b, between, frame), frame, b.p, within, size)
     least = min((each.gap for each in candidates), default=math.inf)
     if least > nearest.distance + TIE * size:
         ox, oy, oz = b.p
         (ax, ay, az), (bx, by, bz) = nearest.point_a.tolist(), nearest.point_b.tolist()
         on_a, on_b = (ox + ax, oy + ay, oz + az), (ox + bx, oy + by, oz + bz)
         gap = (ax - bx) * x + (ay - by) * y + (az - bz) * z
-        frame = frame_along(normal)
         place = dot(frame.u, (ax, ay, az)), dot(frame.v, (ax, ay, az))
         candidates.insert(0, ContactCandidate(*place, gap, on_a, on_b, (NEAREST, NEAREST)))
     return _contacts(reduced(candidates, limit, size), normal)

@@ -24,7 +24,7 @@ from dynx.distance.terrain import GridPoint, Terrain
 from dynx.spatial.plain import Vector3, cross, dot, minus, rotate, rotate_back
 from dynx.spatial.scalar import Floats
 
-MARGIN = 1e-7
+MARGIN = 1e-8
 """Distance outside of a triangle, relative to the size of the shape, that counts as inside."""
 
 CONE = 1e-9

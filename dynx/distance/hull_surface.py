@@ -22,6 +22,8 @@ class HullSurface(NamedTuple):
     """Outward unit normals (k, 3) of the facets; None for points in a plane or on a line."""
     offsets: Floats | None
     """Distances (k,) of the planes of the facets from the origin."""
+    faces: Floats
+    """Normals (j, 3), one for all triangles of a plane."""
 
 
 @lru_cache(maxsize=1024)
@@ -31,13 +33,19 @@ def hull_surface(core: HullCore) -> HullSurface:
     try:
         vertices, faces = convex_hull(points)
     except ArgumentError:
-        return HullSurface(points, None, None)
+        return _flat(points)
     # Flat points have no facets but those of the thickness that they are given.
     known = set(map(tuple, points.tolist()))
     if not known.issuperset(map(tuple, vertices.tolist())):
-        return HullSurface(points, None, None)
+        return _flat(points)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1)
     normals = normals[lengths > 0.0] / lengths[lengths > 0.0, None]
-    return HullSurface(vertices, normals, (normals @ vertices.T).max(axis=1))
+    offsets = (normals @ vertices.T).max(axis=1)
+    _, first = np.unique(np.round(normals, 9) + 0.0, axis=0, return_index=True)
+    return HullSurface(vertices, normals, offsets, normals[np.sort(first)])
+
+
+def _flat(points: Floats) -> HullSurface:
+    return HullSurface(points, None, None, np.empty((0, 3)))

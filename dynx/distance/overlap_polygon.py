@@ -128,6 +128,7 @@ def _of_segments(a: SupportFeature, b: SupportFeature, margin: float, within: fl
     if abs(sine) > PARALLEL_SINE:
         x, y = (gu * ev - gv * eu) / sine, (gu * dv - gv * du) / sine
         if -margin <= x <= length_a + margin and -margin <= y <= length_b + margin:
+            x = min(max(x, 0.0), length_a)
             u, v = p[0] + x * du, p[1] + x * dv
             return [OverlapPlace(u, v, a.height(u, v), b.height(u, v), *edges)]
         return []

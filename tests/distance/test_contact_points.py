@@ -227,7 +227,8 @@ def test_the_least_gap_is_the_distance(
     assert 1 <= len(points) <= limit
     size = size_of(a, b)
     least = min(each.gap for each in points)
-    assert exact.lower - 2.0 * TIE * size <= least <= exact.upper + 2.0 * TIE * size
+    tolerance = (MARGIN + TIE) * size
+    assert exact.lower - tolerance <= least <= exact.upper + tolerance
     for each in points:
         assert each.gap <= 0.02
         assert np.linalg.norm(each.normal) == pytest.approx(1.0, abs=ROUNDING)
