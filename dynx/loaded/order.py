@@ -30,16 +30,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
+from dynx.errors import ArgumentError, EngineError, UnsupportedFeatureError, shown
+from dynx.files.reading import read_file
+from dynx.files.temporary import temporary_folder
 from dynx.loaded.registry import load_as
 from dynx.loaded.robot import EngineCoordinates
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.loading import load
 from dynx.model.numbers import checked_array
+from dynx.model.xml.source import XmlSource
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous, inverse
 from dynx.spatial.so3 import cross, quat_from_rotation, rotate, rotate_back, rotation_from_quat
+
+_SHAPES = ("visual", "collision")
+"""Elements of URDF with the shapes of a link."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,8 +215,29 @@ def order_of(model: Model, engine: str) -> EngineOrder:
                 line=joint.line,
             )
     free = replace(stated, joints=tuple(replace(joint, mimic=None) for joint in stated.joints))
+    try:
+        return _order(engine, path, model, free)
+    except EngineError:
+        # Such as a mesh that the engine does not find: no shape of URDF has a coordinate.
+        text = None if path.suffix != ".urdf" else _without_shapes(path)
+        if text is None:
+            raise
+        with temporary_folder() as folder:
+            bare = Path(folder) / path.name
+            bare.write_bytes(text)
+            return _order(engine, bare, model, free)
+
+
+def _order(engine: str, path: Path, model: Model, free: Model) -> EngineOrder:
     with load_as(engine, path, free) as robot:
         return EngineOrder(engine, model, robot.coordinates(), free.joint_names)
+
+
+def _without_shapes(path: Path) -> bytes | None:
+    """Return the text of a URDF file without its shapes; None for one without shapes."""
+    source = XmlSource(read_file(str(path)), str(path))
+    shapes = [shape for link in source.root.all("link") for tag in _SHAPES for shape in link.all(tag)]
+    return source.apply(*map(source.removal, shapes)).to_bytes() if shapes else None
 
 
 def _padded(x: Floats) -> Floats:

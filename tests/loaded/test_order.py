@@ -260,6 +260,16 @@ def test_the_file_of_mujoco_itself(tmp_path: Path) -> None:
         model.with_base("fixed").order_of("mujoco")
 
 
+def test_meshes_that_an_engine_does_not_find_do_not_matter(tmp_path: Path) -> None:
+    path = tmp_path / "tree.urdf"
+    path.write_text(tree(True))
+    want = dynx.load(path).order_of("mujoco").positions.tolist()
+    mesh = '<collision><geometry><mesh filename="package://nowhere/part.stl"/></geometry></collision></link>'
+    path.write_text(tree(True).replace("</link>", mesh))
+    assert "nowhere" in path.read_text()
+    assert dynx.load(path).order_of("mujoco").positions.tolist() == want
+
+
 def test_what_has_no_order_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match=r"wanted a model that dynx\.load read from a file"):
         dynx.load(tree(False)).order_of("mujoco")
