@@ -209,8 +209,8 @@ def _show_differences(out: Console, report: Entry) -> None:
         effect = each["effect"] or {}
         table.add_row(
             one_line(f"{each['tag']} {each['theirs']}, {each['part']}"),
-            _line(each["first_line"]),
-            _line(each["second_line"]),
+            _line(each, "first"),
+            _line(each, "second"),
             _size(each["size"]),
             *(_size(effect.get(name)) for name in ("position", "mass_matrix", "torque")),
             _cell(each["message"], MAX_MESSAGE),
@@ -293,20 +293,24 @@ def _cells(first: str, second: str) -> tuple[str, str]:
 
 def _places(each: Entry) -> str:
     lines = [
-        f"line {each[key]} of {name}"
-        for key, name in (("first_line", "A"), ("second_line", "B"))
-        if each[key] is not None
+        f"line {each[f'{key}_line']} of {each[f'{key}_file'] or name}"
+        for key, name in (("first", "A"), ("second", "B"))
+        if each[f"{key}_line"] is not None
     ]
     return f"{', '.join(lines)}: " if lines else ""
 
 
 def _lines(each: Entry) -> str:
-    lines = [_line(each[key]) for key in ("first_line", "second_line")]
+    lines = [_line(each, key) for key in ("first", "second")]
     return f" ({lines[0] or '-'}, {lines[1] or '-'})" if any(lines) else ""
 
 
-def _line(line: int | None) -> str:
-    return "" if line is None else str(line)
+def _line(each: Entry, which: str) -> str:
+    """Write a line, with the name of its file if another file includes that."""
+    line, file = each[f"{which}_line"], each[f"{which}_file"]
+    if line is None:
+        return ""
+    return str(line) if file is None else f"{one_line(PurePath(file).name)}:{line}"
 
 
 def _size(value: float | None) -> str:

@@ -14,6 +14,7 @@ from dynx.model import Model
 from dynx.model.elements import Joint, Link
 from dynx.model.geometry.links import ShapeNumber
 from dynx.model.mechanism import ROOT
+from dynx.model.xml.several_files import file_of_line
 from dynx.same.decimals import rounded
 from dynx.same.fit import BodyFit, Fit, angle_of
 from dynx.same.limits import differs, limit_differences
@@ -65,6 +66,20 @@ class Attribute:
     second: str
     first_line: int | None = None
     second_line: int | None = None
+    first_file: str | None = None
+    second_file: str | None = None
+    """Files of the lines, where another file includes them."""
+
+    def __post_init__(self) -> None:
+        name_files_of_lines(self)
+
+
+def name_files_of_lines(difference: object) -> None:
+    """Set the files of the lines of a difference that are of included files."""
+    for which in ("first", "second"):
+        file = file_of_line(getattr(difference, f"{which}_line"))
+        if file is not None:
+            object.__setattr__(difference, f"{which}_file", file)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dynx._version import __version__
 from dynx.files.documents import document_of
 from dynx.files.pages import html_grid
 from dynx.model import Model
-from dynx.same.attributes import Attribute, DescriptionFreedom
+from dynx.same.attributes import Attribute, DescriptionFreedom, name_files_of_lines
 from dynx.same.bounds import Bounds
 from dynx.same.effects import ElementEffect
 from dynx.same.elements import Part
@@ -41,6 +41,12 @@ class ElementDifference:
     size: float
     message: str
     effect: ElementEffect | None
+    first_file: str | None = None
+    second_file: str | None = None
+    """Files of the lines, where another file includes them."""
+
+    def __post_init__(self) -> None:
+        name_files_of_lines(self)
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,12 @@ class Unmatched:
     first_line: int | None
     second_line: int | None
     message: str
+    first_file: str | None = None
+    second_file: str | None = None
+    """Files of the lines, where another file includes them."""
+
+    def __post_init__(self) -> None:
+        name_files_of_lines(self)
 
 
 @dataclass(frozen=True)

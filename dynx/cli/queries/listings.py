@@ -22,6 +22,7 @@ from dynx.model import Joint, Link, Model, library
 from dynx.model.documents import pose_numbers
 from dynx.model.elements import IDENTITY
 from dynx.model.sensors import StatedSensor
+from dynx.model.xml.several_files import file_of_line
 
 
 def info(json_path: str | None, **robot: Any) -> None:
@@ -53,6 +54,7 @@ def model_document(model: Model) -> dict[str, Any]:
                 "mass": 0.0 if link.inertial is None else link.inertial.mass,
                 "has_inertial": link.inertial is not None,
                 "line": link.line,
+                "file": file_of_line(link.line),
             }
             for link in model.links
         ],
@@ -71,7 +73,10 @@ def _records(parts: Iterable[Any] | None) -> list[dict[str, Any]] | None:
     """Return data of a model as JSON; a bound that is infinite becomes null."""
     if parts is None:
         return None
-    return [{name: _finite(value) for name, value in asdict(each).items()} for each in parts]
+    return [
+        {**{name: _finite(value) for name, value in asdict(each).items()}, "file": file_of_line(each.line)}
+        for each in parts
+    ]
 
 
 def _finite(value: Any) -> Any:
@@ -92,6 +97,7 @@ def _joint_entry(joint: Joint) -> dict[str, Any]:
         "mimic": None if joint.mimic is None else asdict(joint.mimic),
         "locked_at": joint.locked_at,
         "line": joint.line,
+        "file": file_of_line(joint.line),
     }
 
 

@@ -60,7 +60,7 @@ from dynx.model.topology import MAX_LINKS
 from dynx.model.tree import Base, Description
 from dynx.model.urdf.reader import inertia_fault
 from dynx.model.xml.reading import Element
-from dynx.model.xml.several_files import free_name
+from dynx.model.xml.several_files import file_of_line, free_name
 from dynx.model.xml.values import name_fault
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
@@ -798,13 +798,9 @@ class _TreeReader:
         if self._compensation:
             first = self._compensation[0]
             more = f" and of {_counted(len(self._compensation) - 1, 'other body')}"
-            self._reading.notes.append(
-                Note(
-                    f"gravcomp of body {shown(first.link)}{more if len(self._compensation) > 1 else ''}: "
-                    "model.gravity_compensation has it as data, and weight is not compensated in dynx",
-                    first.line,
-                )
-            )
+            text = f"gravcomp of body {shown(first.link)}{more if len(self._compensation) > 1 else ''}"
+            text += ": model.gravity_compensation has it as data, and weight is not compensated in dynx"
+            self._reading.notes.append(_note_on_line(text, first.line))
 
     def _note_data(
         self,
@@ -819,7 +815,7 @@ class _TreeReader:
         if taken:
             count = _counted(len(taken), "element")
             text = f"{count} of <{tag}>: model.{held} has them as data, and {effect}"
-            self._reading.notes.append(Note(text, taken[0].line))
+            self._reading.notes.append(_note_on_line(text, taken[0].line))
         if left:
             (element, reason), count = left[0], _counted(len(left), "element")
             text = f"not read: {count} of <{tag}>; {effect_of_left or effect}"
@@ -1041,6 +1037,12 @@ class _TreeReader:
             effect = _NOT_READ_OF_BODIES[kind]
             self._reading.note(element, f"{kind} of {what}{more} is not read: {effect}")
         self._reading.note_ignored()
+
+
+def _note_on_line(message: str, line: int | None) -> Note:
+    """Return a note that names the file of an included line."""
+    file = file_of_line(line)
+    return Note(message if file is None else f"{file}: {message}", line)
 
 
 def _coordinates(

@@ -14,6 +14,26 @@ MAX_INCLUDES = 1000
 """Largest number of files of one model."""
 
 
+class IncludedLine(int):
+    """Line of a file that another one includes or attaches: a number that knows its file."""
+
+    file: str
+
+    def __new__(cls, line: int, file: str = "") -> IncludedLine:
+        """Return the line of that number, and keep the file."""
+        found = super().__new__(cls, line)
+        found.file = file
+        return found
+
+    def __getnewargs__(self) -> tuple[int, str]:  # type: ignore[override]  # that of int has no file
+        return int(self), self.file
+
+
+def file_of_line(line: int | None) -> str | None:
+    """Return the file of a line that is not of the file that was given; None for another line."""
+    return line.file if isinstance(line, IncludedLine) else None
+
+
 @dataclass
 class FilesReading(Reading):
     """State of reading a model whose elements may come from several files."""
@@ -89,6 +109,7 @@ class FilesReading(Reading):
         while stack:
             each = stack.pop()
             self.files[id(each)] = (each, name)
+            each.line = IncludedLine(each.line, name)
             stack += each.children
         return root
 

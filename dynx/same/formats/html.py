@@ -10,6 +10,7 @@ from dynx.errors import escaped
 from dynx.files.excerpts import TextChanges, excerpt_of, text_changes
 from dynx.files.pages import page_environment, page_text
 from dynx.model.loading import read_description
+from dynx.model.xml.several_files import file_of_line
 from dynx.model.xml.source import XmlSource
 from dynx.same.formats.baseline import SameBaseline
 from dynx.same.formats.findings import base_of
@@ -63,7 +64,9 @@ def size(value: float | None) -> str:
 
 def excerpt(text: str | None, line: int | None) -> list[tuple[int, str]]:
     """Return the lines about `line` with their numbers; none where the text or the line is unknown."""
-    return [] if text is None or line is None else excerpt_of(text, line)
+    if text is None or line is None or file_of_line(line) is not None:
+        return []
+    return excerpt_of(text, line)
 
 
 def changes(report: SameReport, text: str | None) -> TextChanges | None:

@@ -9,6 +9,7 @@ from typing import Any
 
 from dynx.errors import escaped
 from dynx.files.sarif import KNOWN, physical_location, sarif_result, sarif_rule, sarif_run, suppression
+from dynx.model.xml.several_files import file_of_line
 from dynx.same.formats.baseline import SameBaseline, place_of
 from dynx.same.formats.findings import RULES, findings
 from dynx.same.report import SameReport
@@ -39,11 +40,18 @@ def _results(report: SameReport, baseline: SameBaseline | None) -> Iterator[dict
         message = escaped(each.message, MESSAGE_LENGTH)
         identity = (each.ours, each.theirs, report.first, str(repetition))
         result = sarif_result(
-            report.second_source, each.rule, each.level, message, each.second_line, *identity
+            file_of_line(each.second_line) or report.second_source,
+            each.rule,
+            each.level,
+            message,
+            each.second_line,
+            *identity,
         )
         result["relatedLocations"] = [
             {
-                "physicalLocation": physical_location(report.first_source, each.first_line),
+                "physicalLocation": physical_location(
+                    file_of_line(each.first_line) or report.first_source, each.first_line
+                ),
                 "message": {"text": f"the element of {escaped(report.first)}"},
             }
         ]
