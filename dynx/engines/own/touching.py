@@ -11,8 +11,6 @@ from dynx.distance.broad_phase import SolidBounds
 from dynx.distance.contact_manifold import contact_points
 from dynx.distance.placed_solids import PlacedSolid
 from dynx.distance.solids import Solid
-from dynx.errors import UnsupportedFeatureError, shown
-from dynx.model.geometry import HeightField
 from dynx.spatial.scalar import Floats
 from dynx.steppers.layout import Layout, Owner
 from dynx.steppers.material import contact_material
@@ -56,7 +54,6 @@ class ContactFinder:
     """Shapes of a scene, and the pairs of them that may touch."""
 
     def __init__(self, layout: Layout, h: float) -> None:
-        """Raises UnsupportedFeatureError for a height field that may be touched."""
         self._h, self._colliders = h, layout.colliders
         self.owners: tuple[Owner, ...] = tuple(dict.fromkeys(each.owner for each in layout.colliders))
         """Rigid bodies with shapes."""
@@ -65,12 +62,6 @@ class ContactFinder:
         self._collider = np.array([k for k, _ in shapes], dtype=np.intp)
         self._owner = np.array([number[layout.colliders[k].owner] for k, _ in shapes], dtype=np.intp)
         self._allowed = layout.collides[np.ix_(self._collider, self._collider)]
-        for k, (collider, placed) in enumerate(shapes):
-            if isinstance(placed.shape, HeightField) and self._allowed[k].any():
-                raise UnsupportedFeatureError(
-                    f"{shown(layout.colliders[collider].name)} of the scene {shown(layout.name)} is a height "
-                    "field, whose contacts the engine 'dynx' does not have"
-                )
         self._local: Floats = np.array([placed.T for _, placed in shapes])
         solids = [Solid(placed.shape, np.eye(4)) for _, placed in shapes]
         self._solids = [PlacedSolid(each) for each in solids]

@@ -12,7 +12,6 @@ import pytest
 
 import dynx
 from dynx.engines.own.stepper import MAX_RESIDUAL, OwnStepper
-from dynx.errors import UnsupportedFeatureError
 from dynx.model.geometry import Collision, HeightField
 from dynx.rbd.constraints import ConstraintSets, Residuals, Solution
 from dynx.spatial.scalar import Floats
@@ -233,11 +232,22 @@ def test_impulses_that_miss_their_conditions_are_noted(monkeypatch: pytest.Monke
         assert "3 times by more than 1e-06 m/s, at most by 2e-06" in world.notes[-1]
 
 
-def test_height_fields_are_refused_by_name() -> None:
-    field = HeightField(((0.0, 0.0), (0.0, 0.0)), (1.0, 1.0))
-    scene = Scene("hills", bodies=(SceneBody("hill", (Collision(field),)), *cubes([1.0])))
-    with pytest.raises(UnsupportedFeatureError, match="'hill' of the scene 'hills' is a height field"):
-        World(scene, "dynx")
+def test_a_box_and_a_ball_rest_on_a_height_field() -> None:
+    flat = tuple((0.3,) * 9 for _ in range(9))
+    field = HeightField(flat, (2.0, 2.0))
+    hill = SceneBody("hill", (Collision(field),))
+    at = (dynx.Pose((0.03, 0.02, 0.5)), dynx.Pose((0.6, 0.5, 0.55)))
+    bodies = (
+        hill,
+        box("box", (0.3, 0.3, 0.2), mass=2.0, pose=at[0]),
+        sphere("ball", 0.1, mass=1.0, pose=at[1]),
+    )
+    with World(Scene("hills", bodies=bodies), "dynx", 1e-3) as world:
+        world.run(0.5)
+        assert world.state.bodies["box"].position == pytest.approx([0.03, 0.02, 0.4], abs=1e-6)
+        assert world.state.bodies["ball"].position == pytest.approx([0.6, 0.5, 0.4], abs=1e-6)
+        weight = -sum(contact.force[2] for contact in world.contacts("hill"))
+    assert weight == pytest.approx(3.0 * G, rel=1e-6)
 
 
 def test_materials_are_those_of_the_scene() -> None:
