@@ -483,12 +483,16 @@ class ImpossibleInertia(Rule):
 
     fault: ClassVar[Fault]
     engines: ClassVar[Mapping[str, str]] = measured_on("pybullet", "mujoco", "drake")
-    advice = "Take the tensor from the CAD model again; in the meantime use the nearest that a body can have."
+    advice = (
+        "Take the tensor from the CAD model again; until then use the nearest tensor that a body can have."
+    )
     choices: ClassVar[Mapping[str, str]] = {
-        "fuse": "merge the link with links rigidly connected to it where that makes a body, which changes no "
-        "equation of motion; else as nearest",
-        "nearest": "put the nearest tensor that a body can have in its place",
-        "keep": "leave the numbers, and give them after loading to the engines that take them",
+        "fuse": (
+            "merge the link with rigidly connected links if a body can have their inertia; otherwise like "
+            "nearest"
+        ),
+        "nearest": "write the nearest tensor that a body can have",
+        "keep": "leave the numbers, and set them after loading in the engines that accept them",
     }
 
     def occurrences(self, case: Case) -> Iterable[Detection]:

@@ -137,7 +137,8 @@ _LEAST_FACTOR = 1.5
 
 
 class InertiaScaledUp(Rule):
-    """DX522 inertia-scaled-up: The inertias of several links are one multiple of those of their shapes.
+    """DX522 inertia-scaled-up: The inertias of several links are the same multiple of the inertias of their
+    shapes.
 
     Simulations with a fixed time step are more stable with larger inertias. So some authors multiply the
     tensors of light links by 10 or 100, or reduce masses without changing the tensors. The rule finds this in
@@ -154,7 +155,7 @@ class InertiaScaledUp(Rule):
     """
 
     kind = "practice"
-    advice = "Give the moments of the solid, and a smaller step to the simulator."
+    advice = "Write the moments of the solid shape, and use a smaller time step."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the links of each common factor."""

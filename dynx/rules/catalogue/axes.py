@@ -39,8 +39,8 @@ class AxisNotUnit(EditingRule):
     """DX201 axis-not-unit: The axis of a joint is not a unit vector.
 
     URDF says that ``<axis xyz="..."/>`` should have length 1. A wrong length does not change the direction,
-    and most readers normalise the axis. Examples are ``0 0 -2``, ``1 1 0``, and ``0.577350 0.577350
-    0.577350``, which was rounded to six digits, so that its length is off by 1e-6.
+    and most readers normalise the axis. Examples are ``0 0 -2``, ``1 1 0``, and
+    ``0.577350 0.577350 0.577350``, which was rounded to six digits, so that its length is off by 1e-6.
 
     - PyBullet 3.2.7 keeps the length. A prismatic joint then moves by length times its coordinate, so the
       positions of all links beyond it are wrong. The simulation (``stepSimulation``) uses the axis with this
@@ -93,17 +93,17 @@ class AxisWithoutDirection(EditingRule):
     - MuJoCo 4.0 refuses the file.
     - Drake 1.51 refuses the zero axis, and reads ``<axis/>`` as (1, 0, 0).
 
-    What to do: write the direction. For ``<axis x="0" y="0" z="1"/>``, ``dynx doctor --fix`` writes ``xyz="0
-    0 1"``. In other cases the file does not contain the direction, and ``dynx doctor --fix`` writes URDF's
-    default, (1, 0, 0). If the joint should not move, ``--choose DX202=fixed`` makes it a fixed joint.
+    What to do: write the direction. For ``<axis x="0" y="0" z="1"/>``, ``dynx doctor --fix`` writes
+    ``xyz="0 0 1"``. In other cases the file does not contain the direction, and ``dynx doctor --fix`` writes
+    URDF's default, (1, 0, 0). If the joint should not move, ``--choose DX202=fixed`` makes it a fixed joint.
     """
 
     stage = "reading"
     advice = "Write the direction of the axis, or make the joint fixed."
     engines = EVERY_ENGINE
     choices = {
-        "x": "make an axis without direction (1, 0, 0), URDF's default",
-        "fixed": "make a joint whose axis has no direction fixed",
+        "x": "write URDF's default (1, 0, 0) for an axis without direction",
+        "fixed": "make the joint fixed if its axis has no direction",
     }
     changed = "gave joints without a direction to move in one, or fixed them"
 
@@ -143,7 +143,7 @@ def _direction_in_parts(axis: SourceElement) -> str | None:
 
 
 class AxisAttributeMisspelled(EditingRule):
-    """DX218 axis-attribute-misspelled: The direction of an axis stands in an attribute that is not ``xyz``.
+    """DX218 axis-attribute-misspelled: The direction of an axis is in another attribute than ``xyz``.
 
     Examples are ``<axis xzy="0 0 1"/>``, ``<axis XYZ="0 0 1"/>`` and ``<axis rpy="0 0 1"/>``. No engine reads
     the numbers under such a name.
@@ -180,7 +180,7 @@ class AxisAttributeMisspelled(EditingRule):
 
 
 class UnreadableAxisOfFixedJoint(EditingRule):
-    """DX219 unreadable-axis-of-fixed-joint: The axis of a joint that does not turn is not three numbers.
+    """DX219 unreadable-axis-of-fixed-joint: The axis of a fixed or floating joint is not three numbers.
 
     A fixed or floating joint has no axis. But exporters write ``<axis/>``, ``<axis xyz=""/>`` or the remains
     of a template.
@@ -223,8 +223,8 @@ _NEGLIGIBLE_DEVIATION = 1e-14
 
 
 class AxisNearlyAligned(EditingRule):
-    """DX226 axis-nearly-aligned: A joint axis is off a coordinate axis by less than 2e-8 rad, which some
-    engines drop.
+    """DX226 axis-nearly-aligned: A joint axis differs from a coordinate axis by less than 2e-8 rad; some
+    engines drop this.
 
     CAD programs export axes with noise, such as ``0 1 1.2e-12`` or ``1.6e-10 0 1``. Some engines have faster
     code for axes along x, y and z, and use it if the axis is within a tolerance of such a coordinate axis.
@@ -244,7 +244,7 @@ class AxisNearlyAligned(EditingRule):
     engines = measured_on("pinocchio", "drake")
     advice = "Write the coordinate axis."
     choices = {
-        "align": "write the coordinate axis for axes off it by less than 2e-8 rad; this changes the physics",
+        "align": "write the coordinate axis; this changes the physics by less than 2e-8",
         "keep": "leave such axes as they are",
     }
     changed = "wrote the coordinate axis for joint axes that were off it by less than 2e-8 rad"

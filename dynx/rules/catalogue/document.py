@@ -37,7 +37,7 @@ _ELEMENTS_THAT_OCCUR_ONCE = {
 
 
 class RepeatedElement(EditingRule):
-    """DX411 repeated-element: An element that is allowed once is repeated.
+    """DX411 repeated-element: An element that may occur only once is repeated.
 
     For example, a joint has two ``<origin>``. This happens when files are merged or templates are expanded.
 
@@ -53,7 +53,7 @@ class RepeatedElement(EditingRule):
     """
 
     stage = "reading"
-    advice = "Keep the right one; engines use the first."
+    advice = "Keep the right element; engines use the first."
     engines = measured_on("mujoco")
     changed = "removed repeated elements, of which engines use the first"
 
@@ -80,7 +80,7 @@ MAX_LINE_BYTES = 8191
 
 
 class LineTooLong(EditingRule):
-    """DX413 line-too-long: PyBullet cuts a line of more than 8191 bytes, and the cut falls into an element.
+    """DX413 line-too-long: PyBullet breaks a line of more than 8191 bytes inside an element.
 
     PyBullet 3.2.7 reads each line into a buffer of 8192 bytes, and inserts a line break into a longer line.
     Between two elements the line break has no effect. Inside an element it can change a number: for example,
@@ -197,8 +197,7 @@ _LONE_CARRIAGE_RETURN = re.compile(rb"\r(?![ \t\r]*(?:\n|\Z))")
 
 
 class LoneCarriageReturn(Rule):
-    """DX422 lone-carriage-return: A line ends with a carriage return alone, and PyBullet loses the text
-    behind it.
+    """DX422 lone-carriage-return: A line ends with a carriage return alone; PyBullet loses the text after it.
 
     Programs end a line with a line feed (Linux, macOS), or with a carriage return and a line feed (Windows).
     A carriage return alone ended lines on the Macintosh until 2001. Today it comes from conversions of line
@@ -295,7 +294,7 @@ _NOT_ASCII_BASED = ("utf-16", "utf-32", "utf-7", "iso-2022", "hz")
 
 
 class TextNotUtf8(Rule):
-    """DX440 text-not-utf8: The file is not in UTF-8, as which engines read every file.
+    """DX440 text-not-utf8: The file is not in UTF-8, but engines read every file as UTF-8.
 
     Engines read every file as UTF-8, and ignore the encoding that the file declares. In a file in Latin-1 or
     a similar encoding, characters beyond ASCII are then invalid. In comments this has no effect. In names of
@@ -406,7 +405,7 @@ _XACRO_PREFIX = "xacro:"
 
 
 class LeftOverXacro(EditingRule):
-    """DX531 left-over-xacro: The file has xacro elements, which every engine skips with all that they hold.
+    """DX531 left-over-xacro: The file has xacro elements, which every engine ignores with their contents.
 
     The program ``xacro`` evaluates elements such as ``<xacro:property>``, ``<xacro:include>`` and calls of
     macros. They remain in a file that was expanded by hand, or renamed from ``.xacro`` to ``.urdf``.
@@ -426,8 +425,8 @@ class LeftOverXacro(EditingRule):
     skipped = "xacro elements that were not expanded"
     advice = "Expand the file with xacro, or remove these elements."
     choices = {
-        "keep": "leave xacro elements, which every engine skips, in the file",
-        "remove": "remove xacro elements, which every engine skips",
+        "keep": "leave xacro elements, which every engine ignores, in the file",
+        "remove": "remove xacro elements, which every engine ignores",
     }
     changed = "removed xacro elements"
 
@@ -454,13 +453,13 @@ def _outermost_xacro(root: SourceElement) -> Iterator[SourceElement]:
 
 
 class MalformedXml(Rule):
-    """DX532 malformed-xml: The text is not well-formed XML, which engines forgive and other programs do not.
+    """DX532 malformed-xml: The text is not well-formed XML; engines read it, and other programs refuse it.
 
     All four engines parse URDF with tinyxml2, which accepts some faults: ``--`` in a comment, ``&`` or ``<``
-    in a name, attributes without white space between them, and a blank after ``<``. It also accepts ``<!mesh
-    ...>`` in place of a comment, a malformed or second XML declaration, text before ``<robot>`` and elements
-    after it. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file without a warning, and
-    read the same robot. Python's XML parsers, xacro and the launch system of ROS refuse it.
+    in a name, attributes without white space between them, and a blank after ``<``. It also accepts
+    ``<!mesh ...>`` in place of a comment, a malformed or second XML declaration, text before ``<robot>`` and
+    elements after it. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file without a
+    warning, and read the same robot. Python's XML parsers, xacro and the launch system of ROS refuse it.
 
     dynx reads the file as the engines do, with a note. tinyxml2 and dynx refuse other faults: an attribute
     that occurs twice or has no quotes, and an element that does not end. dynx names the line.

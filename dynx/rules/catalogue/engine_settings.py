@@ -20,8 +20,8 @@ from dynx.rules.inertia import rigid_groups
 
 
 class InertiaScaledForContact(EditingRule):
-    """DX114 inertia-scaled-for-contact: A link has inertia_scaling, by which PyBullet alone multiplies its
-    inertia.
+    """DX114 inertia-scaled-for-contact: A link has inertia_scaling; only PyBullet multiplies the inertia by
+    it.
 
     ``<contact><inertia_scaling value="3.0"/></contact>`` is an extension of PyBullet, which makes contacts of
     light links more stable. Many files that come with PyBullet, and files copied from them, have it.
@@ -109,8 +109,7 @@ class InertiaFromShapes(CallingRule):
 
 
 class LinksMergedWrongly(CallingRule):
-    """DX116 links-merged-wrongly: PyBullet's flag that merges links on fixed joints adds their inertias in
-    wrong frames.
+    """DX116 links-merged-wrongly: PyBullet's flag URDF_MERGE_FIXED_LINKS adds inertias in wrong frames.
 
     With ``flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_MERGE_FIXED_LINKS``, ``p.loadURDF`` merges links that
     fixed joints connect into one body. The simulation is then faster.
@@ -171,9 +170,9 @@ class MujocoSettings(EditingRule):
 
     The effect in MuJoCo can have any size. For example, ``settotalmass`` scales all torques.
 
-    What to do: write the intended masses and tensors into the file, and set options in the program. ``dynx
-    doctor --fix`` removes these attributes and leaves the others, such as ``meshdir`` and ``fusestatic``.
-    ``--choose DX224=keep`` keeps them; MuJoCo then reads another robot.
+    What to do: write the intended masses and tensors into the file, and set options in the program.
+    ``dynx doctor --fix`` removes these attributes and leaves the others, such as ``meshdir`` and
+    ``fusestatic``. ``--choose DX224=keep`` keeps them; MuJoCo then reads another robot.
     """
 
     stage = "reading"

@@ -46,8 +46,8 @@ _MAX_CORRECTIONS = 4
 
 
 class InertiaBrokenByRounding(Rule):
-    """DX102 inertia-broken-by-rounding: Principal moments lie on the bound of what a body can have, so
-    rounding decides what engines do.
+    """DX102 inertia-broken-by-rounding: A principal moment equals the sum of the other two, so rounding
+    decides whether engines accept it.
 
     The principal moments of a rigid body are never negative, and none exceeds the sum of the other two. For a
     thin plate or rod, and for a point mass about the joint, the largest moment equals this sum. Then the last
@@ -201,7 +201,7 @@ class InertiaNotDiagonal(Rule):
     """
 
     engines = measured_on("pybullet")
-    advice = "Give the principal moments, with the axes in the rpy of the inertial."
+    advice = "Write the principal moments, with the axes as the rpy of the inertial."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the links that can move and whose tensor PyBullet's diagonalisation does not reproduce."""
@@ -236,7 +236,7 @@ _ROUNDING_OF_ROTATION = 4.0 * float(np.finfo(float).eps)
 
 
 class RootInertialRotated(Rule):
-    """DX106 root-inertial-rotated: On a fixed base PyBullet mistakes the axes of the root's inertial frame
+    """DX106 root-inertial-rotated: With a fixed base PyBullet mistakes the axes of the root's inertial frame
     for those of the world.
 
     The ``<inertial>`` of the root link has an ``rpy`` that is not zero. With a fixed base the mass of the
@@ -257,7 +257,7 @@ class RootInertialRotated(Rule):
     """
 
     engines = measured_on("pybullet")
-    advice = "Give the root's tensor in the axes of its link, with rpy zero."
+    advice = "Write the root's tensor in the axes of its link, with rpy zero."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the root, on the fixed base, where its inertial frame is rotated."""
@@ -311,7 +311,7 @@ class InertiaTooSmall(Rule):
     """
 
     engines = measured_on("mujoco")
-    advice = "Raise the moment to 1e-14 kg m^2, or change the unit for a robot that is really so small."
+    advice = "Raise the moment to 1e-14 kg m^2, or change the unit if the robot really is so small."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the links with such a tensor, and moving links whose rigid group is a point or a rod."""
@@ -469,8 +469,8 @@ _EXACT_FRAMES = "mujoco.exact_inertial_frames"
 
 
 class TinyInertialOffset(Rule):
-    """DX117 tiny-inertial-offset: MuJoCo drops the pose of an inertial frame that is off the link frame by
-    less than 1e-6.
+    """DX117 tiny-inertial-offset: MuJoCo drops the pose of an inertial frame that differs from the link frame
+    by less than 1e-6.
 
     MuJoCo stores the inertia of a body about its principal axes, the largest moment first. It also stores the
     pose of these axes in the body frame: the centre of mass and the rotation. When MuJoCo compiles a model,
@@ -488,8 +488,9 @@ class TinyInertialOffset(Rule):
     rotation changes the mass matrix by 1e-6 of the difference between the moments.
 
     What to do: usually the offset is noise of a CAD program. Then write zero. If the number is intended,
-    clear the marks after loading: ``model.body_sameframe[:] = model.body_simple[:] = model.dof_simplenum[:] =
-    0``. No text of an ``<inertial>`` avoids them, because MuJoCo orders the axes itself.
+    clear the marks after loading:
+    ``model.body_sameframe[:] = model.body_simple[:] = model.dof_simplenum[:] = 0``. No text of an
+    ``<inertial>`` avoids them, because MuJoCo orders the axes itself.
 
     By default dynx prints this line, and proves the cause by it. ``--choose DX117=zero`` writes zero into the
     file instead, for all engines. The report then says that the physics changed. If a robot with a floating
@@ -497,7 +498,7 @@ class TinyInertialOffset(Rule):
     """
 
     engines = measured_on("mujoco")
-    advice = "Write zero if the offset is noise; else clear MuJoCo's marks after loading."
+    advice = "Write zero if the offset is noise; otherwise clear MuJoCo's marks after loading."
     choices = {
         "call": "clear the marks in MuJoCo after loading",
         "zero": "write zero for what MuJoCo drops; this changes the physics",
@@ -582,8 +583,8 @@ _STEPS_IN_LAST_PLACE = range(-16, 17)
 
 
 class InertiaRoundedUnsymmetrically(Rule):
-    """DX119 inertia-rounded-unsymmetrically: PyBullet's inverse dynamics refuses the robot for the rounding
-    of a heavy link's tensor.
+    """DX119 inertia-rounded-unsymmetrically: PyBullet's inverse dynamics refuses the robot because of
+    rounding errors in a heavy link's tensor.
 
     Before the first call of ``calculateInverseDynamics``, ``calculateMassMatrix`` or ``calculateJacobian``,
     PyBullet 3.2.7 computes the tensor of each link about the link's origin, and checks that it is symmetric.

@@ -135,7 +135,8 @@ class NegativeDamping(EditingRule):
 
 
 class MimicAsConstraint(CallingRule):
-    """DX304 mimic-as-constraint: A joint mimics another: a constraint to some engines, nothing to others.
+    """DX304 mimic-as-constraint: A joint mimics another joint: some engines add a constraint, and others
+    ignore it.
 
     ``<mimic joint="a" multiplier="2" offset="0.1"/>`` means that the joint is always at 2 a + 0.1.
 
@@ -150,12 +151,12 @@ class MimicAsConstraint(CallingRule):
     torque acts on the joint that it follows, on every backend.
 
     What to do: find out how your engine reads mimic joints. The doctor compares all engines with free mimic
-    joints, and prints the calls that switch the constraints off. The file is correct, so ``dynx doctor
-    --fix`` does not change it.
+    joints, and prints the calls that switch the constraints off. The file is correct, so
+    ``dynx doctor --fix`` does not change it.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "sdf")
-    advice = "Know whether mimic joints are free, constrained or dependent in your engine."
+    advice = "Find out whether mimic joints are free, constrained or dependent in your engine."
     engines = measured_on("mujoco", "drake")
     calls = ("mujoco.no_mimic", "drake.free_mimics")
     changed = "compared with mimic joints free"
@@ -207,7 +208,7 @@ class EmptyDynamics(EditingRule):
 
 
 class LimitsAsForces(CallingRule):
-    """DX306 limits-as-forces: A joint has equal limits, to which some engines pull the joint.
+    """DX306 limits-as-forces: A joint has two equal limits; some engines pull the joint to them.
 
     ``<limit lower="-2" upper="2"/>`` defines the range of a joint. URDF does not define what happens beyond
     this range. A joint with two equal limits is beyond its range at every other position.
@@ -304,7 +305,7 @@ class ContactsAsForces(CallingRule):
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")
-    advice = "Switch contacts off where you need rigid-body torques."
+    advice = "Switch contacts off if you need torques of the rigid bodies alone."
     engines = measured_on("mujoco")
     present_as = "contact_forces"
     depends_on_state = True

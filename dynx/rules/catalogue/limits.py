@@ -45,8 +45,8 @@ class JointWithoutLimit(EditingRule):
     advice = 'Write the <limit> of the joint, or type="continuous".'
     engines = measured_on("pinocchio", "pybullet")
     choices = {
-        "unlimited": "leave joints without limit unlimited: revolute ones become continuous",
-        "zero": "give joints without limit lower and upper limits of 0",
+        "unlimited": "leave the joint unlimited; a revolute joint becomes continuous",
+        "zero": "write 0 for the missing lower and upper limits",
     }
     changed = "made joints without limit continuous, or gave them one"
 
@@ -201,9 +201,9 @@ class SafetyControllerWithoutGain(EditingRule):
     - Pinocchio 4.1 refuses the file: "joint safety: no k_velocity".
     - PyBullet 3.2.7 and MuJoCo 4.0 ignore it. Drake 1.51 warns that it ignores it.
 
-    What to do: if one of your programs reads the element, complete it; otherwise remove it. ``dynx doctor
-    --fix`` corrects a misspelled name, such as ``k_velocty="20"``. Otherwise it adds ``k_velocity="0"``, with
-    which the safety controller has no effect.
+    What to do: if one of your programs reads the element, complete it; otherwise remove it.
+    ``dynx doctor --fix`` corrects a misspelled name, such as ``k_velocty="20"``. Otherwise it adds
+    ``k_velocity="0"``, with which the safety controller has no effect.
     """
 
     stage = "reading"
@@ -224,8 +224,8 @@ _UPPER_OF_PYBULLET = -1.0
 
 
 class UpperLimitMissing(EditingRule):
-    """DX216 upper-limit-missing: A limit has a lower end of -1 or less and no upper end, which PyBullet reads
-    as -1.
+    """DX216 upper-limit-missing: A limit has a lower of -1 or less and no upper; PyBullet reads the missing
+    upper as -1.
 
     In URDF a missing ``lower`` or ``upper`` is 0, so ``<limit lower="-2" .../>`` is the range -2 to 0. This
     is rarely intended.
@@ -248,7 +248,7 @@ class UpperLimitMissing(EditingRule):
     engines then have this range, too.
     """
 
-    advice = "Write both ends of every range."
+    advice = "Write lower and upper of every range."
     engines = measured_on("pybullet")
     changed = 'wrote upper="0" where a limit has no upper end'
     depends_on_state = True
@@ -267,7 +267,7 @@ _TYPES_WITH_LIMIT = ("revolute", "prismatic", "fixed", "floating", "planar")
 
 
 class LimitIncompleteInUrdf12(EditingRule):
-    """DX222 limit-incomplete-in-urdf-1-2: A robot states URDF 1.2, and a limit lacks its lower or upper end.
+    """DX222 limit-incomplete-in-urdf-1-2: A robot states URDF 1.2, and a limit lacks lower or upper.
 
     Up to URDF 1.1, a missing ``lower`` or ``upper`` is 0. From URDF 1.2, the ``<limit>`` of every joint that
     is not continuous needs ``lower`` and ``upper``, but ``effort`` and ``velocity`` may be missing.
@@ -275,10 +275,10 @@ class LimitIncompleteInUrdf12(EditingRule):
     - Pinocchio 4.1 (its reader is urdfdom) refuses the file: "revolute and prismatic joints must have both
       lower and upper position limits specified in URDF version 1.2 or later". It also refuses a fixed joint
       with such a ``<limit>``.
-      - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore the version. dynx reads a missing limit as 0.
+    - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore the version. dynx reads a missing limit as 0.
 
-      What to do: write both limits. ``dynx doctor --fix`` corrects a misspelled name, such as ``uper="1"``.
-      Otherwise it writes 0 for the missing limit, as earlier versions of URDF define it.
+    What to do: write both limits. ``dynx doctor --fix`` corrects a misspelled name, such as ``uper="1"``.
+    Otherwise it writes 0 for the missing limit, as earlier versions of URDF define it.
     """
 
     stage = "reading"
@@ -313,7 +313,7 @@ class EffortLimitZero(Rule):
     """
 
     kind = "practice"
-    advice = "Write the largest torque [N m] or force [N] that the motor gives at the joint."
+    advice = "Write the largest torque [N m] or force [N] of the motor at the joint."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield moving joints with a coordinate of their own and an effort limit of exactly zero."""
@@ -365,7 +365,7 @@ class RangeOfZeroWidth(Rule):
     """
 
     kind = "practice"
-    advice = 'Write the range of the joint, or type="continuous" if it has none, or type="fixed".'
+    advice = 'Write the range of the joint, or type="continuous" if the joint has no range, or type="fixed".'
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield revolute and prismatic joints with a coordinate of their own and no range."""
@@ -392,8 +392,8 @@ class LimitsOnContinuousJoint(EditingRule):
     person who reads the file may think that the joint has this range.
 
     What to do: if the joint has a range, write ``type="revolute"``. Otherwise remove the two attributes, so
-    that the joint is unlimited in every engine. By default ``dynx doctor --fix`` leaves them. With ``--choose
-    DX509=drop`` it removes them.
+    that the joint is unlimited in every engine. By default ``dynx doctor --fix`` leaves them. With
+    ``--choose DX509=drop`` it removes them.
     """
 
     kind = "practice"

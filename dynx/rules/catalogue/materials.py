@@ -59,13 +59,13 @@ class TextureNotFound(EditingRule):
     """
 
     stage = "reading"
-    advice = "Put the image where the description says it is, or give the material a colour."
+    advice = "Put the image where the file says it is, or give the material a colour."
     engines = measured_on("drake")
     choices = {
-        "colour": "put a grey colour in place of textures that Drake does not find",
+        "colour": "write a grey colour in place of textures that Drake does not find",
         "keep": "keep them; Drake then refuses the file",
     }
-    changed = "put a grey colour in place of textures that Drake does not find"
+    changed = "write a grey colour in place of textures that Drake does not find"
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Yield the textures of materials of the robot whose file Drake does not find."""
@@ -79,8 +79,7 @@ class TextureNotFound(EditingRule):
 
 
 class MaterialWithoutColour(EditingRule):
-    """DX427 material-without-colour: A material of the robot has no name, no colour, or one of the wrong
-    form.
+    """DX427 material-without-colour: A material of the robot has no name, no colour, or an invalid colour.
 
     A ``<material>`` directly in ``<robot>`` defines a colour for ``<visual>`` elements. The dynamics does not
     depend on it. But some engines refuse the file:

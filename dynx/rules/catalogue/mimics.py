@@ -24,7 +24,7 @@ from dynx.rules.numbers_in_text import decimal
 
 
 class MimicOfNothing(EditingRule):
-    """DX208 mimic-of-nothing: A mimic joint has nothing to follow.
+    """DX208 mimic-of-nothing: A mimic joint names no joint that it can follow.
 
     There are four cases: ``<mimic>`` names no joint, a missing joint, or its own joint; or it belongs to a
     fixed joint.
@@ -102,11 +102,11 @@ class MimicOfFixedJoint(EditingRule):
     offset. If the joint should move by itself, ``--choose DX209=free`` removes ``<mimic>`` instead.
     """
 
-    advice = "Make the follower fixed too."
+    advice = "Make the follower fixed, too."
     engines = measured_on("drake")
     choices = {
-        "fixed": "make a joint that mimics a fixed one fixed at its offset",
-        "free": "let a joint that mimics a fixed one move freely",
+        "fixed": "make the follower of a fixed joint fixed at its offset",
+        "free": "let the follower of a fixed joint move freely",
     }
     changed = "made joints that mimic a fixed one fixed or free"
 
@@ -155,10 +155,12 @@ class MimicChain(EditingRule):
     """
 
     kind = "practice"
-    advice = "Let every mimic joint name the joint that is driven."
+    advice = "Let every mimic joint name the joint that moves by itself."
     choices = {
-        "keep": "keep followers of a follower",
-        "direct": "let every follower name the joint that is driven, with the factors multiplied",
+        "keep": "keep chains of mimic joints",
+        "direct": (
+            "let every follower name the joint that moves by itself, with the product of the multipliers"
+        ),
     }
     changed = "let mimic joints follow the driven joint directly, with the factors multiplied"
 
@@ -184,8 +186,8 @@ _ROUNDING_OF_RANGE = 1e-3
 
 
 class MimicBeyondLimits(Rule):
-    """DX512 mimic-beyond-limits: A mimic joint leaves its own limits while the joint it follows stays within
-    its own.
+    """DX512 mimic-beyond-limits: A mimic joint leaves its limits although the joint that it follows is within
+    its limits.
 
     The multiplier and the offset map the range of the leading joint to a range of the follower. This range is
     larger than the follower's own ``<limit>``. So one of these numbers is wrong: a limit, the multiplier or
@@ -199,7 +201,7 @@ class MimicBeyondLimits(Rule):
     """
 
     kind = "practice"
-    advice = "Give the follower the range that multiplier and offset make of the leader's."
+    advice = "Give the follower the range that follows from the leading joint's range, multiplier and offset."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield followers with limits that the leader's range violates."""

@@ -80,7 +80,7 @@ class LinkWithoutInertial(Rule):
     """
 
     engines = measured_on("pybullet", "mujoco")
-    advice = "Write an <inertial>: the true one, or one of zero where the link is a mere frame."
+    advice = "Write an <inertial> with the true numbers, or with zeros if the link is only a frame."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the links that can move and have no ``<inertial>``."""
@@ -134,14 +134,14 @@ class MasslessRoot(Rule):
     ``dynx doctor --fix`` moves the inertia of one link to the root: the heaviest link that is rigidly
     connected to the root. This link gets a zero inertia, and keeps its name and its place. The equations of
     motion are the same. If no link rigidly connected to the root has mass, the root gets 2e-15 kg and 1.5e-14
-    kg m^2. All engines accept these numbers, which are too small to show in any result. ``--choose
-    DX107=keep`` leaves the root unchanged. A robot in which no link has mass is DX118.
+    kg m^2. All engines accept these numbers, which are too small to show in any result.
+    ``--choose DX107=keep`` leaves the root unchanged. A robot in which no link has mass is DX118.
     """
 
     engines = measured_on("pybullet")
     advice = "Give the root link the mass of the body that it represents."
     choices = {
-        "lump": "merge the heaviest link rigidly connected to the root into it; else give it the least mass",
+        "lump": "merge the root with the heaviest rigidly connected link; else give the root the least mass",
         "keep": "keep the file; PyBullet then fixes the robot to the world",
     }
     trap_base = "floating"
@@ -241,8 +241,8 @@ class MasslessLinkWithInertia(Rule):
 
 
 class MasslessMovingLink(Rule):
-    """DX110 massless-moving-link: A joint carries a link without mass, which MuJoCo refuses although the link
-    carries others.
+    """DX110 massless-moving-link: A joint carries a link without mass; MuJoCo refuses it although further
+    links have mass.
 
     Links without mass between two joints are common: a shoulder of three axes is mostly written as three
     joints with two empty links between them. The motion is well defined, because the last joint carries a
@@ -262,7 +262,7 @@ class MasslessMovingLink(Rule):
     """
 
     engines = measured_on("mujoco")
-    advice = "For MuJoCo, give the link a mass and moments just above 1e-15 and 1e-14."
+    advice = "For MuJoCo, give the link a mass just above 1e-15 kg and moments just above 1e-14 kg m^2."
     choices = {
         "least": "give the link the least mass and moments that MuJoCo accepts",
         "keep": "keep the file; MuJoCo refuses it",
@@ -332,7 +332,7 @@ class MassMatrixSingular(Rule):
 
 
 class NoInertialData(Rule):
-    """DX118 no-inertial-data: Nothing that moves has mass or inertia, so there is no dynamics to compare.
+    """DX118 no-inertial-data: No moving link has mass or inertia, so there is no dynamics to compare.
 
     Files for display, for motion planning or from a CAD export without materials often have no
     ``<inertial>``, or only zeros in each ``<inertial>``. Such a file states the kinematics of a robot and
@@ -350,10 +350,10 @@ class NoInertialData(Rule):
 
     What to do: enter the masses and inertias, from the data sheet or the CAD model.
 
-    ``dynx doctor --fix`` does not invent inertias. The report does not call the engines alike. ``--choose
-    DX118=least`` gives every moving body 2e-15 kg and 1.5e-14 kg m^2, with which all engines load the file.
-    Do not simulate the result: a torque of 1e-6 N m accelerates a joint to millions of rad/s. If only some
-    moving links have no mass, see DX110 and DX113.
+    ``dynx doctor --fix`` does not invent inertias. The report does not call the engines alike.
+    ``--choose DX118=least`` gives every moving body 2e-15 kg and 1.5e-14 kg m^2, with which all engines load
+    the file. Do not simulate the result: a torque of 1e-6 N m accelerates a joint to millions of rad/s. If
+    only some moving links have no mass, see DX110 and DX113.
     """
 
     engines = measured_on("pybullet", "mujoco")
@@ -487,19 +487,19 @@ class IncompleteInertial(EditingRule):
     The effect is a file that does not load, or a link without its mass. The relative error of the mass matrix
     is then of order 0.01 to 1.
 
-    What to do: complete the ``<inertial>``. ``dynx doctor --fix`` corrects a misspelled name, such as ``<mass
-    valeu="1.5"/>`` or ``ixxx="0.02"``. In other cases it guesses, and the report says so. It reads the number
-    in ``<mass>2.5</mass>`` as the mass. It drops a tensor without mass, so the link has no mass. A mass
-    without tensor becomes a point mass at the origin of the inertial, as in Pinocchio and Drake. ``--choose
-    DX410=weightless`` drops this mass, too.
+    What to do: complete the ``<inertial>``. ``dynx doctor --fix`` corrects a misspelled name, such as
+    ``<mass valeu="1.5"/>`` or ``ixxx="0.02"``. In other cases it guesses, and the report says so. It reads
+    the number in ``<mass>2.5</mass>`` as the mass. It drops a tensor without mass, so the link has no mass. A
+    mass without tensor becomes a point mass at the origin of the inertial, as in Pinocchio and Drake.
+    ``--choose DX410=weightless`` drops this mass, too.
     """
 
     stage = "reading"
     advice = "Give every <inertial> a <mass value> and an <inertia>."
     engines = EVERY_ENGINE
     choices = {
-        "point": "make an inertial without mass zero, one without tensor a point mass",
-        "weightless": "make an inertial without mass or tensor zero",
+        "point": "write zeros for an inertial without mass; make an inertial without tensor a point mass",
+        "weightless": "write zeros for an inertial without mass or without tensor",
     }
     changed = "completed inertials that had no mass or no tensor"
 

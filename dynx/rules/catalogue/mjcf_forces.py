@@ -86,7 +86,7 @@ class SpringInInverseDynamics(CallingRule):
 
 
 class GravityCompensation(CallingRule):
-    """DX311 gravity-compensation: The weight of a body is compensated, by MuJoCo alone.
+    """DX311 gravity-compensation: Only MuJoCo compensates the weight of a body.
 
     ``<body gravcomp="1"/>`` is a force that cancels the weight of the body (``0.5`` cancels half of it).
 
@@ -119,7 +119,7 @@ class GravityCompensation(CallingRule):
 
 
 class TendonForces(CallingRule):
-    """DX312 tendon-forces: A tendon pulls at joints, in MuJoCo alone.
+    """DX312 tendon-forces: A tendon pulls at joints, but only in MuJoCo.
 
     ``<tendon>`` contains fixed tendons, which couple joints, and spatial tendons, which run over sites and
     geoms. The stiffness, damping, dry friction, armature and limits of a tendon cause forces at the joints.
@@ -153,7 +153,7 @@ class TendonForces(CallingRule):
 
 
 class ActuatorForces(CallingRule):
-    """DX313 actuator-forces: Actuators act on the joints without a command, in MuJoCo alone.
+    """DX313 actuator-forces: Actuators act on the joints without a command, but only in MuJoCo.
 
     ``<position joint="elbow" kp="100"/>`` holds the joint at the command. Without a command, it holds the
     joint at 0, because the command is 0 in a new ``MjData``. Other actuators can also act without a command
@@ -172,7 +172,7 @@ class ActuatorForces(CallingRule):
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
-    advice = "Port the gains of actuators into the controller, or set their commands."
+    advice = "Write the gains of the actuators into the controller, or set the commands of the actuators."
     engines = measured_on("mujoco")
     calls = ("mujoco.no_actuators",)
     changed = "compared without actuators"
@@ -209,7 +209,7 @@ class EqualityAsConstraint(CallingRule):
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
-    advice = "Close loops and couple joints in each engine by its own means."
+    advice = "Close loops and couple joints by the constraints of each engine."
     engines = measured_on("mujoco", "drake")
     calls = ("mujoco.no_mimic", "drake.free_mimics")
     changed = "compared without equality constraints"
@@ -224,7 +224,7 @@ class EqualityAsConstraint(CallingRule):
 
 
 class FluidForces(CallingRule):
-    """DX315 fluid-forces: The file states a medium, whose drag MuJoCo alone adds.
+    """DX315 fluid-forces: The file states a medium; only MuJoCo adds its drag.
 
     ``<option density="1.2" viscosity="1.8e-5"/>`` states the medium in which the robot moves, such as air or
     water.

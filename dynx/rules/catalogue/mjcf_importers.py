@@ -97,8 +97,8 @@ _SETTINGS = {
 
 
 class InertiaByCompilerSetting(EditingRule):
-    """DX602 inertia-by-compiler-setting: The compiler changes masses or inertias by a setting that importers
-    drop.
+    """DX602 inertia-by-compiler-setting: A setting of the compiler changes masses or inertias, and importers
+    ignore it.
 
     ``<compiler>`` may select the geoms that have a mass (``inertiagrouprange``), raise small masses and
     moments (``boundmass``, ``boundinertia``), replace impossible moments (``balanceinertia``) and scale all
@@ -162,8 +162,8 @@ def _tensor_of(inertial: Inertial) -> Floats:
 
 
 class OrientationOtherThanQuaternion(EditingRule):
-    """DX603 orientation-other-than-quaternion: An orientation is no quaternion, and importers read it
-    otherwise.
+    """DX603 orientation-other-than-quaternion: An orientation is not a quaternion, and some importers read it
+    differently.
 
     MJCF has five attributes for an orientation: ``quat``, ``axisangle``, ``euler`` in the sequence
     ``eulerseq``, ``xyaxes`` and ``zaxis``.
@@ -249,8 +249,8 @@ class InertiaNotPrincipal(EditingRule):
 
 
 class SeveralJointsInBody(EditingRule):
-    """DX607 several-joints-in-body: A body at some distance from its parent has several joints, which Drake
-    places otherwise.
+    """DX607 several-joints-in-body: A body with an offset from its parent has several joints, which Drake
+    places elsewhere.
 
     A body of MJCF may have several joints, which act one after the other. For example, three hinges are a
     wrist.
@@ -267,7 +267,7 @@ class SeveralJointsInBody(EditingRule):
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
-    advice = "Put the body into one without joints, which has its place."
+    advice = "Put the body into an outer body that has its pose and no joints."
     engines = measured_on("drake")
     changed = "put bodies with several joints into bodies that have their places"
 
@@ -292,7 +292,7 @@ class SeveralJointsInBody(EditingRule):
 
 
 class FrameOfBodies(Rule):
-    """DX608 frame-of-bodies: A ``<frame>`` or ``<replicate>`` holds bodies, which importers leave out.
+    """DX608 frame-of-bodies: A ``<frame>`` or ``<replicate>`` contains bodies, which importers ignore.
 
     ``<frame pos="0 0 1">`` moves its contents. ``<replicate count="4" euler="0 0 90">`` repeats its contents.
 
@@ -303,8 +303,8 @@ class FrameOfBodies(Rule):
     The effect: in these engines the robot lacks the bodies. If it lacks a joint, the doctor does not use the
     engine.
 
-    What to do: write the bodies with their own poses. MuJoCo's ``mj_saveLastXML`` and ``dynx convert --to
-    mjcf`` write such a file. ``dynx doctor --fix`` does not change the file.
+    What to do: write the bodies with their own poses. MuJoCo's ``mj_saveLastXML`` and
+    ``dynx convert --to mjcf`` write such a file. ``dynx doctor --fix`` does not change the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -322,7 +322,7 @@ class FrameOfBodies(Rule):
 
 
 class SeveralBodiesInWorld(Rule):
-    """DX609 several-bodies-in-world: The world has several bodies, of which Pinocchio loads the first.
+    """DX609 several-bodies-in-world: The world has several bodies, and Pinocchio loads only the first.
 
     Besides the robot, ``<worldbody>`` may contain a table, a floor or a second robot.
 
@@ -424,7 +424,7 @@ class JointByDefaultClass(EditingRule):
 
 
 class JointWithoutType(EditingRule):
-    """DX605 joint-without-type: A joint states no type, which PyBullet takes for no joint.
+    """DX605 joint-without-type: A joint states no type, and PyBullet ignores it.
 
     In MJCF the default type of a ``<joint>`` is ``hinge``.
 
@@ -455,7 +455,7 @@ class JointWithoutType(EditingRule):
 
 
 class JointWithoutName(EditingRule):
-    """DX606 joint-without-name: A joint has no name, so that each engine gives it another one.
+    """DX606 joint-without-name: A joint has no name, so each engine gives it another name.
 
     Names of joints are optional in MJCF.
 
@@ -491,8 +491,8 @@ class JointWithoutName(EditingRule):
 
 
 class InertiaFromShapesOfMjcf(CallingRule):
-    """DX610 inertia-from-shapes-of-mjcf: PyBullet computes inertias from shapes, whatever an ``<inertial>``
-    says.
+    """DX610 inertia-from-shapes-of-mjcf: PyBullet computes inertias from shapes, and ignores the moments of
+    an ``<inertial>``.
 
     ``<inertial mass="2" diaginertia="0.1 0.1 0.2"/>`` states the mass and the moments of a body.
 
@@ -504,9 +504,9 @@ class InertiaFromShapesOfMjcf(CallingRule):
 
     The effect: every body has another inertia. In most robots the mass matrix is off by tens of per cent.
 
-    What to do: set the masses and the moments after loading, or convert the file to URDF (``dynx convert --to
-    urdf``) and load it with this flag. The file is correct, so ``dynx doctor --fix`` does not change it. The
-    doctor prints the call that sets the masses and the moments.
+    What to do: set the masses and the moments after loading, or convert the file to URDF
+    (``dynx convert --to urdf``) and load it with this flag. The file is correct, so ``dynx doctor --fix``
+    does not change it. The doctor prints the call that sets the masses and the moments.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -557,7 +557,7 @@ def _joints_in_text(case: Case, document: MjcfText) -> Iterator[tuple[BodyInText
 
 
 class IncludeOfMjcf(Rule):
-    """DX613 include-of-mjcf: The file includes another one, which some engines leave out.
+    """DX613 include-of-mjcf: The file includes another file, which some engines ignore.
 
     ``<include file="robot.xml"/>`` inserts the contents of another file. Usually the file of a scene includes
     the file of a robot.
@@ -586,7 +586,7 @@ class IncludeOfMjcf(Rule):
 
 
 class ModelWithoutName(EditingRule):
-    """DX614 model-without-name: The model has no name, for which Drake refuses the file.
+    """DX614 model-without-name: The model has no name, so Drake refuses the file.
 
     The attribute ``model`` of ``<mujoco>`` is optional.
 
@@ -610,7 +610,7 @@ class ModelWithoutName(EditingRule):
 
 
 class WorldWithoutBody(Rule):
-    """DX615 world-without-body: The world has no body, for which Pinocchio refuses the file.
+    """DX615 world-without-body: The world has no body, so Pinocchio refuses the file.
 
     If a file describes only a floor, a table or settings, its ``<worldbody>`` has only geoms, or is empty.
 
@@ -635,7 +635,7 @@ class WorldWithoutBody(Rule):
 
 
 class MeshOfMjcfNotObj(Rule):
-    """DX616 mesh-of-mjcf-not-obj: A mesh is no OBJ file, for which Drake refuses the file.
+    """DX616 mesh-of-mjcf-not-obj: A mesh is not an OBJ file, so Drake refuses the file.
 
     MuJoCo reads meshes in STL, OBJ and its own format MSH.
 
@@ -644,8 +644,8 @@ class MeshOfMjcfNotObj(Rule):
     - Drake 1.51 refuses the file, even if no geom uses the mesh: "Drake's MuJoCo parser currently only
       supports mesh files in .obj format".
 
-    What to do: convert the meshes to OBJ, or the robot to URDF (``dynx convert --to urdf``). ``dynx doctor
-    --fix`` does not change the file.
+    What to do: convert the meshes to OBJ, or the robot to URDF (``dynx convert --to urdf``).
+    ``dynx doctor --fix`` does not change the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -681,7 +681,7 @@ class MeshOfMjcfNotFound(Rule):
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
     stated = True
     stated_refusal = True
-    advice = "Put the file there, or correct the path, capitals included."
+    advice = "Put the file there, or correct the path (capital letters matter)."
     engines = measured_on("mujoco", "drake")
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
@@ -693,7 +693,7 @@ class MeshOfMjcfNotFound(Rule):
 
 
 class PlaceOfFixedBody(Rule):
-    """DX618 place-of-fixed-body: A body is fixed to the world, and Pinocchio leaves out its place and mass.
+    """DX618 place-of-fixed-body: A body is fixed to the world, and Pinocchio ignores its pose and mass.
 
     A body of ``<worldbody>`` without a joint is fixed to the world at its ``pos``. Most arms have such a
     base.
@@ -734,9 +734,9 @@ class FixedBodyFloats(Rule):
 
     The effect: the robot falls, and its mass matrix has six more rows.
 
-    What to do: fix the base to the world by ``p.createConstraint``. Or convert the file to URDF (``dynx
-    convert --to urdf``), and load it with ``useFixedBase=True``. ``dynx doctor --fix`` does not change the
-    file.
+    What to do: fix the base to the world by ``p.createConstraint``. Or convert the file to URDF
+    (``dynx convert --to urdf``), and load it with ``useFixedBase=True``. ``dynx doctor --fix`` does not
+    change the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)

@@ -42,14 +42,15 @@ class LinkNamedWorld(Rule):
     What to do: use the name ``world`` only for the root link of a robot with a fixed base. If the link stands
     for the ground, load the robot with a fixed base.
 
-    ``dynx doctor --fix`` renames the link to ``world_link``, also in the joints that name it and in ``<gazebo
-    reference>``. If a program looks the link up by its old name, ``--choose DX109=keep`` keeps the name.
+    ``dynx doctor --fix`` renames the link to ``world_link``, also in the joints that name it and in
+    ``<gazebo reference>``. If a program looks the link up by its old name, ``--choose DX109=keep`` keeps the
+    name.
     """
 
     engines = measured_on("drake", "mujoco")
     advice = "Give the link another name, or load the robot with a fixed base."
     choices = {
-        "rename": "give the link another name, wherever the document names it",
+        "rename": "give the link another name, wherever the file uses the name",
         "keep": "keep the name; engines that give it a meaning then read another robot",
     }
     trap_base = "floating"
@@ -179,7 +180,7 @@ class RobotWithoutName(EditingRule):
 
 
 class PercentInName(EditingRule):
-    """DX414 percent-in-name: A name has a % in it, which PyBullet uses as a printf format.
+    """DX414 percent-in-name: A name contains %, which PyBullet uses as a printf format.
 
     PyBullet 3.2.7 prints messages with names, and uses some of these messages as the format of ``printf``.
     ``%p`` then prints memory contents. ``%s`` reads memory and ``%n`` writes memory, which can end the
@@ -242,7 +243,7 @@ class NameWithBlanks(EditingRule):
     advice = "Write the name without blanks around it."
     choices = {
         "keep": "leave blanks around names as they are",
-        "trim": "remove blanks around names, wherever the document mentions them",
+        "trim": "remove blanks around names, wherever the file uses the names",
     }
     changed = "removed blanks around names"
 

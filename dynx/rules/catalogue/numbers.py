@@ -44,8 +44,8 @@ class DecimalComma(MisspelledNumberRule):
     advice = "Write decimals with a point."
     engines = EVERY_ENGINE
     choices = {
-        "decimal": "read a comma in a number as its decimal point",
-        "thousands": "read a comma in a number as standing between thousands",
+        "decimal": "read a comma in a number as the decimal separator",
+        "thousands": "read a comma in a number as a separator between thousands",
     }
     changed = "wrote decimal points instead of commas"
     fault = "comma"
@@ -77,7 +77,7 @@ class CommaBetweenNumbers(MisspelledNumberRule):
     are decimal separators, see DX401.
     """
 
-    advice = "Separate the numbers of a vector by blanks alone."
+    advice = "Separate the numbers of a vector only by blanks."
     engines = EVERY_ENGINE
     unambiguous = True
     changed = "separated the numbers of vectors by blanks instead of commas"
@@ -109,7 +109,7 @@ class TextAfterNumber(MisspelledNumberRule):
     or there is no number at the beginning (``heavy``), see DX420.
     """
 
-    advice = "Write the number alone, in SI units."
+    advice = "Write only the number, in SI units."
     engines = EVERY_ENGINE
     changed = "kept the number where something followed it"
     fault = "rest"
@@ -144,7 +144,7 @@ class VectorOfWrongLength(MisspelledNumberRule):
     advice = "Write three numbers."
     engines = EVERY_ENGINE
     choices = {
-        "first": "keep the first three numbers of a vector, and add zeros where some are missing",
+        "first": "keep the first three numbers of a vector, and add zeros for missing numbers",
         "default": "remove a vector without three numbers",
     }
     changed = "made vectors have three numbers"
@@ -215,7 +215,7 @@ class TabInVector(MisspelledNumberRule):
     What to do: separate numbers by blanks, as ``dynx doctor --fix`` does.
     """
 
-    advice = "Separate the numbers of a vector by blanks alone."
+    advice = "Separate the numbers of a vector only by blanks."
     engines = measured_on("pinocchio", "pybullet")
     changed = "separated the numbers of vectors by blanks instead of tabs and line breaks"
     fault = "tab"
@@ -304,8 +304,8 @@ class AttributeWithoutNumber(MisspelledNumberRule):
     advice = "Write the numbers, or remove the attribute."
     engines = measured_on("pinocchio", "mujoco", "drake")
     choices = {
-        "leave": "leave what is no number as it is, and list it",
-        "guess": "write 0 for a mass, a moment and a word of a vector, and remove any other attribute",
+        "leave": "leave text that is not a number as it is, and list it",
+        "guess": "write 0 for a mass, a moment and a word in a vector, and remove any other such attribute",
     }
     changed = "removed attributes without a number, or wrote 0 for what is none"
     fault = "word"
@@ -336,7 +336,7 @@ class AttributeWithoutNumber(MisspelledNumberRule):
 
 
 class MinusNotAscii(MisspelledNumberRule):
-    """DX421 minus-not-ascii: A number has a minus sign or a dash of typography instead of the hyphen-minus.
+    """DX421 minus-not-ascii: A number has a typographic minus sign or dash instead of the hyphen-minus.
 
     Text that was copied from a document or a web page may have the minus sign U+2212 or a dash before
     negative numbers. It looks like ``-``, but no engine reads it.
@@ -368,8 +368,9 @@ Expression = tuple[NumericAttribute, Misspelling]
 class ExpressionNotExpanded(EditingRule):
     """DX429 expression-not-expanded: A number that dynx does not need is an expression of xacro.
 
-    Examples are ``<origin rpy="${3.14159/2} 0 0"/>`` in a ``<collision>``, and ``<safety_controller
-    k_velocity="${k}"/>``. Such a file was never expanded by ``xacro``, or it was expanded by hand.
+    Examples are ``<origin rpy="${3.14159/2} 0 0"/>`` in a ``<collision>``, and
+    ``<safety_controller k_velocity="${k}"/>``. Such a file was never expanded by ``xacro``, or it was
+    expanded by hand.
 
     - In a ``<collision>``, MuJoCo 4.0 refuses the expression ("bad format in attribute 'rpy'").
     - Pinocchio 4.1 refuses the expression in ``<calibration>``, in ``<safety_controller>``, in the position
@@ -380,9 +381,9 @@ class ExpressionNotExpanded(EditingRule):
     In a ``<visual>`` every engine accepts the expression. In other elements of a joint, and in an
     ``<inertial>``, dynx refuses it, because the dynamics depends on the number.
 
-    What to do: write the number, or name the file ``.xacro``, so that dynx expands it with ``xacro``. ``dynx
-    doctor --fix`` calculates simple expressions (numbers, ``pi``, ``+ - * /``). For any other expression it
-    removes the ``<collision>``, the element of the joint, or the position limit.
+    What to do: write the number, or name the file ``.xacro``, so that dynx expands it with ``xacro``.
+    ``dynx doctor --fix`` calculates simple expressions (numbers, ``pi``, ``+ - * /``). For any other
+    expression it removes the ``<collision>``, the element of the joint, or the position limit.
     """
 
     stage = "reading"

@@ -63,7 +63,7 @@ class OrientationAsQuaternion(EditingRule):
 
 
 class UnreadableQuaternion(EditingRule):
-    """DX419 unreadable-quaternion: The quaternion of an origin is no rotation, or stands beside ``rpy``.
+    """DX419 unreadable-quaternion: The quaternion of an origin is invalid, or the origin also has ``rpy``.
 
     From URDF 1.1, ``quat_xyzw`` holds four numbers separated by blanks, not all zero. An origin with
     ``quat_xyzw`` must not have ``rpy``. Of the four engines, only Pinocchio reads the quaternion (DX418).
@@ -185,16 +185,16 @@ class AngleCutShort(EditingRule):
 
     All engines read the number unchanged.
 
-    What to do: write the angles with all digits, unless they were calibrated. By default ``dynx doctor
-    --fix`` keeps the angles. With ``--choose DX514=full`` it writes all digits, which moves the links beyond
-    the joint by this error.
+    What to do: write the angles with all digits, unless they were calibrated. By default
+    ``dynx doctor --fix`` keeps the angles. With ``--choose DX514=full`` it writes all digits, which moves the
+    links beyond the joint by this error.
     """
 
     kind = "practice"
-    advice = "Write angles in full: 1.5707963267948966."
+    advice = "Write angles with all digits: 1.5707963267948966."
     choices = {
         "keep": "keep the angles as they are written",
-        "full": "write multiples of pi/4 in full",
+        "full": "write multiples of pi/4 with all digits",
     }
     changed = "wrote multiples of pi/4 in full"
     changes_physics = True

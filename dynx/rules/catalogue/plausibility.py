@@ -28,8 +28,7 @@ _ROUNDING_OF_BOUNDS = 1e-9
 
 
 class InertiaBeyondGeometry(Rule):
-    """DX501 inertia-beyond-geometry: A moment of inertia is larger than any body of the link's shape and mass
-    can have.
+    """DX501 inertia-beyond-geometry: A moment of inertia is larger than the link's shape and mass allow.
 
     The rule has two bounds.
 
@@ -192,7 +191,7 @@ class CenterOfMassOutsideGeometry(Rule):
     """
 
     kind = "practice"
-    advice = "Give the origin of the inertial in metres and in the frame of its own link."
+    advice = "Write the origin of the inertial in metres and in the frame of its own link."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the links whose centre of mass is outside, and by how much."""
@@ -278,9 +277,9 @@ class MassRatioExtreme(Rule):
     in every engine, because the condition number of the mass matrix is about as large as the ratio of the
     masses. Inverse dynamics is not affected, and engines agree on it.
 
-    Usual causes: a mass is in grams or tonnes, and others are in kilograms. Or a sensor frame has ``mass
-    value="1e-06"`` because an importer refused links without mass. Only the author of the file knows the
-    right mass, so no edit removes the cause.
+    Usual causes: a mass is in grams or tonnes, and others are in kilograms. Or a sensor frame has
+    ``mass value="1e-06"`` because an importer refused links without mass. Only the author of the file knows
+    the right mass, so no edit removes the cause.
     """
 
     kind = "practice"
@@ -326,9 +325,9 @@ class DensityImplausible(Rule):
     20 and 21,400, and the least is 2.5 (a drone with an arm). The rule reports only the finger knuckles of
     one hand, which have 50 g in cubes of 2 mm.
 
-    Usual causes: a mass is in grams or tonnes. Or a shape is in millimetres without ``scale="0.001 0.001
-    0.001"``. Or the shape is a tiny placeholder. Or an exporter computed the mass from a mesh in the wrong
-    unit.
+    Usual causes: a mass is in grams or tonnes. Or a shape is in millimetres without
+    ``scale="0.001 0.001 0.001"``. Or the shape is a tiny placeholder. Or an exporter computed the mass from a
+    mesh in the wrong unit.
 
     All engines use the numbers unchanged. A heavy finger dominates every torque of the arm that carries it.
 

@@ -29,8 +29,8 @@ def _found(element: SourceElement, at: SourceElement, message: str) -> Detection
 
 
 class InertiaFromShapesOfSdf(CallingRule):
-    """DX701 inertia-from-shapes-of-sdf: PyBullet computes moments of inertia from shapes, whatever the file
-    says.
+    """DX701 inertia-from-shapes-of-sdf: PyBullet computes moments of inertia from shapes, and ignores the
+    moments in the file.
 
     ``<inertial>`` of SDF has ``<mass>`` and ``<inertia>`` with six entries.
 
@@ -83,7 +83,7 @@ def _is_true(case: Case, element: SourceElement) -> bool:
 
 
 class AxisWithoutLimit(EditingRule):
-    """DX702 axis-without-limit: An axis of SDF has no limit, for which PyBullet refuses the file.
+    """DX702 axis-without-limit: An axis of SDF has no limit, so PyBullet refuses the file.
 
     ``<limit>`` of an ``<axis>`` is optional. Without it a joint is unlimited.
 
@@ -112,7 +112,7 @@ class AxisWithoutLimit(EditingRule):
 
 
 class InertialWithoutInertia(EditingRule):
-    """DX703 inertial-without-inertia: An inertial of SDF has no inertia, for which PyBullet refuses the file.
+    """DX703 inertial-without-inertia: An inertial of SDF has no inertia, so PyBullet refuses the file.
 
     An example is ``<inertial><mass>20</mass></inertial>``. In SDF the default of the moments is 1 kg m^2
     about each axis.
@@ -191,7 +191,7 @@ class FramesOfSdf(Rule):
 
 
 class JointToWorld(Rule):
-    """DX705 joint-to-world: A joint ties a link to the world, for which PyBullet refuses the file.
+    """DX705 joint-to-world: A joint connects a link to the world, so PyBullet refuses the file.
 
     ``<parent>world</parent>`` fixes a robot of SDF to the world.
 
@@ -251,8 +251,8 @@ class SpringOfSdf(Rule):
 
 
 class EmptyDynamicsOfSdf(EditingRule):
-    """DX707 empty-dynamics-of-sdf: A dynamics element of SDF has neither damping nor friction, for which
-    PyBullet refuses the file.
+    """DX707 empty-dynamics-of-sdf: A dynamics element of SDF has neither damping nor friction, so PyBullet
+    refuses the file.
 
     In ``<dynamics>`` of an ``<axis>``, ``<damping>`` and ``<friction>`` are optional, with the default 0. For
     example, the element may contain only a spring.
@@ -282,7 +282,7 @@ class EmptyDynamicsOfSdf(EditingRule):
 
 
 class IncludeOfSdf(Rule):
-    """DX708 include-of-sdf: A model of SDF includes another, which PyBullet leaves out.
+    """DX708 include-of-sdf: A model of SDF includes another model, which PyBullet ignores.
 
     ``<include><uri>model://arm</uri></include>`` adds the model of another file.
 
@@ -292,15 +292,15 @@ class IncludeOfSdf(Rule):
 
     The robot lacks the links and joints of the other file.
 
-    What to do: write a file with all links (``dynx convert --to urdf`` or ``--to sdf``). ``dynx doctor
-    --fix`` does not change the file.
+    What to do: write a file with all links (``dynx convert --to urdf`` or ``--to sdf``).
+    ``dynx doctor --fix`` does not change the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
     trap_base = "floating"
     stated = True
     stated_refusal = True
-    advice = "Convert the file to one with all links (dynx convert)."
+    advice = "Write a file with all links (dynx convert)."
     engines = measured_on("pybullet")
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
@@ -316,7 +316,7 @@ def _uri(case: Case, include: SourceElement) -> str:
 
 
 class SeveralRootsOfSdf(Rule):
-    """DX709 several-roots-of-sdf: Several links of a model are the child of no joint, and PyBullet crashes.
+    """DX709 several-roots-of-sdf: Several links of a model have no joint to a parent, and PyBullet crashes.
 
     A static model of SDF may have links that no joint connects. All links of a static model are fixed to the
     world.
@@ -348,8 +348,7 @@ class SeveralRootsOfSdf(Rule):
 
 
 class SharedNameOfSdf(EditingRule):
-    """DX710 shared-name-of-sdf: Two parts of one model or link have the same name, for which Drake refuses
-    the file.
+    """DX710 shared-name-of-sdf: Two parts of one model or link have the same name, so Drake refuses the file.
 
     Within a model, the names of links, joints and frames must differ. Within a link, the names of collisions
     must differ, and the names of visuals must differ. Older files violate this: a joint has the name of its
@@ -476,7 +475,7 @@ class ProductsOfInertiaOfSdf(Rule):
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
     trap_base = "floating"
     stated = True
-    advice = "Turn the frame of the inertial into the principal axes, or convert the file to URDF."
+    advice = "Rotate the frame of the inertial into the principal axes, or convert the file to URDF."
     engines = measured_on("pybullet")
 
     def occurrences(self, case: Case) -> Iterable[Detection]:

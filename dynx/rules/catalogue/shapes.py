@@ -59,7 +59,8 @@ class UnknownCollisionShape(EditingRule):
 
 
 class ShapeWithoutGeometry(EditingRule):
-    """DX424 shape-without-geometry: A visual or collision has no geometry, or one that no engine knows.
+    """DX424 shape-without-geometry: A visual or collision has no geometry, or a geometry that no engine
+    supports.
 
     Examples are ``<collision/>``, ``<visual><geometry/></visual>``, and a ``<geometry>`` with an element of
     another format. Usually a template was not filled in, or an exporter had no shape.
@@ -76,10 +77,10 @@ class ShapeWithoutGeometry(EditingRule):
     """
 
     stage = "reading"
-    advice = "Remove the element, or give it a geometry."
+    advice = "Remove the element, or write its geometry."
     engines = measured_on("pybullet", "mujoco")
     choices = {
-        "remove": "remove visuals and collisions without a geometry that an engine knows",
+        "remove": "remove visuals and collisions without a geometry that an engine supports",
         "keep": "keep them; engines then refuse the file",
     }
     changed = "removed visuals and collisions without geometry"
@@ -134,11 +135,11 @@ class CollisionShapeWithoutSize(EditingRule):
     """
 
     stage = "reading"
-    advice = "Remove the shape, or give it its size or file."
+    advice = "Remove the shape, or write its size or file."
     engines = measured_on("mujoco", "pybullet")
     choices = {
         "remove": "remove collisions without size",
-        "thicken": "write 1e-6 m for sizes of zero; remove a collision only where a size is missing",
+        "thicken": "write 1e-6 m for sizes of zero; remove a collision only if a size is missing",
         "keep": "keep them; engines that need a size then refuse the file",
     }
     changed = "removed collision shapes without size or file, or gave them a size"
@@ -217,7 +218,7 @@ class VisualIncomplete(EditingRule):
     advice = "Write the size, the file, or the name and colour that the visual lacks."
     engines = measured_on("pybullet", "mujoco")
     choices = {
-        "complete": "remove visuals of an incomplete shape, and complete their materials",
+        "complete": "remove visuals with an incomplete shape, and complete their materials",
         "keep": "keep them; engines then refuse the file",
     }
     changed = "removed incomplete visuals, and completed the materials of visuals"
@@ -242,7 +243,7 @@ def _completion(case: Case, visual: SourceElement, element: SourceElement) -> Ed
 
 
 class MeshNotFound(Rule):
-    """DX516 mesh-not-found: The file of a mesh, or of the texture of a visual, is not where the description
+    """DX516 mesh-not-found: The file of a mesh, or of the texture of a visual, is not where the robot file
     says.
 
     The rule reports a missing file only if dynx knows where it should be: a path relative to the robot file,
@@ -268,7 +269,7 @@ class MeshNotFound(Rule):
     """
 
     kind = "practice"
-    advice = "Put the file there, or correct the path, capitals included."
+    advice = "Put the file there, or correct the path (capital letters matter)."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the first reference to each missing file."""

@@ -31,12 +31,12 @@ class JointOfSeveralFreedoms(EditingRule):
 
     dynx refuses such a joint in URDF.
 
-    What to do: write joints of one degree of freedom each, with massless links between them. ``dynx doctor
-    --fix`` writes three rotations for a spherical joint, two translations and a rotation for a planar joint,
-    and three translations and three rotations for a floating joint. The chain has the same motion. Its
-    coordinates are angles, which are singular if the middle angle is 90 degrees. The limits of the joint are
-    dropped. MuJoCo refuses massless links that move (DX110), so the links in between have 2e-15 kg.
-    ``--choose DX210=fixed`` makes the joint fixed instead.
+    What to do: write joints of one degree of freedom each, with massless links between them.
+    ``dynx doctor --fix`` writes three rotations for a spherical joint, two translations and a rotation for a
+    planar joint, and three translations and three rotations for a floating joint. The chain has the same
+    motion. Its coordinates are angles, which are singular if the middle angle is 90 degrees. The limits of
+    the joint are dropped. MuJoCo refuses massless links that move (DX110), so the links in between have 2e-15
+    kg. ``--choose DX210=fixed`` makes the joint fixed instead.
     """
 
     stage = "reading"
@@ -115,7 +115,7 @@ class TooManyJoints(Rule):
     the robot. If the file has too few such frames, or more than 127 joints move, there is no remedy.
     """
 
-    advice = "Drop links that are mere frames from the file for PyBullet."
+    advice = "Remove links that are only frames from the file for PyBullet."
     engines = measured_on("pybullet")
     choices = {
         "drop": "remove frames without mass at the ends of the robot until 127 joints are left",
@@ -248,7 +248,7 @@ class WorldNotDeclared(EditingRule):
 
 
 class SeveralRootLinks(EditingRule):
-    """DX223 several-root-links: A link is the child of no joint, and is not the root of the robot.
+    """DX223 several-root-links: A link is not the child of a joint, and is not the root of the robot.
 
     A robot in URDF is one tree. If the joint of a link was forgotten or commented out, or a table was added
     to the file, the file has a second tree.
@@ -259,17 +259,17 @@ class SeveralRootLinks(EditingRule):
 
     dynx refuses the file.
 
-    What to do: add the joint, or write two files. The file does not say where the link belongs, so ``dynx
-    doctor --fix`` attaches it to the root by a fixed joint without offset, as MuJoCo does. ``--choose
-    DX223=remove`` removes the smaller trees instead. In both cases the tree with the most links keeps its
-    root. If several trees have this number of links, it is the first of them.
+    What to do: add the joint, or write two files. The file does not say where the link belongs, so
+    ``dynx doctor --fix`` attaches it to the root by a fixed joint without offset, as MuJoCo does.
+    ``--choose DX223=remove`` removes the smaller trees instead. In both cases the tree with the most links
+    keeps its root. If several trees have this number of links, it is the first of them.
     """
 
     stage = "reading"
     advice = "Add the joint that is missing, or write a file for each tree."
     engines = measured_on("pinocchio", "pybullet", "drake")
     choices = {
-        "attach": "attach a link without joint to the root by a fixed joint, at its origin",
+        "attach": "attach a link without joint to the root by a fixed joint, at the origin of the root",
         "remove": "remove the trees that are not attached to the root",
     }
     changed = "attached links without joint to the root, or removed them"
@@ -332,7 +332,7 @@ _JOINT_TAG = "drake:joint"
 
 
 class JointOfDrake(EditingRule):
-    """DX227 joint-of-drake: A <drake:joint> joins two links in one engine and is not there in the others.
+    """DX227 joint-of-drake: A <drake:joint> connects two links; only Drake reads it.
 
     Drake has joints that URDF lacks: ball, universal, planar, screw and curvilinear joints. A file states
     such a joint in the element ``<drake:joint name="..." type="ball">``, with the same children as

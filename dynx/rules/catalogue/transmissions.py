@@ -19,8 +19,8 @@ class TransmissionOfNothing(EditingRule):
       name, or names a joint that the file does not have. It ignores types other than ``SimpleTransmission``.
     - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore transmissions.
 
-    What to do: if ROS controllers use the transmission, complete it; otherwise remove it. ``dynx doctor
-    --fix`` removes it. The dynamics does not depend on it.
+    What to do: if ROS controllers use the transmission, complete it; otherwise remove it.
+    ``dynx doctor --fix`` removes it. The dynamics does not depend on it.
     """
 
     stage = "reading"
