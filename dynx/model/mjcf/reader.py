@@ -52,7 +52,7 @@ from dynx.model.mjcf.sensor_objects import SensorObjects
 from dynx.model.mjcf.sensors import read_sensors, require_objects
 from dynx.model.mjcf.shapes import Geom, GeomReader
 from dynx.model.mjcf.tendons import read_tendons
-from dynx.model.mjcf.vocabulary import unused_attributes
+from dynx.model.mjcf.vocabulary import unknown_parts, unused_attributes
 from dynx.model.package_search import StrPath
 from dynx.model.sensors import StatedSensor
 from dynx.model.tendons import StatedTendon
@@ -268,7 +268,7 @@ class _TreeReader:
         actuators, contact_filter = self._read_actuators(tendons), self._contact_filter()
         configurations = self._read_configurations(base)
         self._note_compensation()
-        for element, text in unused_attributes(root):
+        for element, text in (*unused_attributes(root), *unknown_parts(root)):
             self._reading.note(element, text)
         self._note_counts(root)
         self._document.options.note(self._reading, scene=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from dynx.errors import escaped, shown
 from dynx.model.xml.reading import Element
 
 _NO_EFFECT = ""
@@ -99,3 +100,110 @@ def unused_attributes(root: Element) -> Iterator[tuple[Element, str]]:
                 known.update(dict.fromkeys(stated))
     for (tag, effect), (element, known) in found.items():
         yield element, f"not read of <{tag}>: {', '.join(known)}; {effect}"
+
+
+# -- elements ---------------------------------------------------------------------------------------------
+
+_MOTORS = (
+    "general motor position velocity intvelocity orientation pid damper cylinder muscle adhesion dcmotor "
+    "plugin"
+)
+_SENSORS = (
+    "touch accelerometer velocimeter gyro force torque magnetometer camprojection rangefinder jointpos "
+    "jointvel tendonpos tendonvel actuatorpos actuatorvel actuatorfrc jointactuatorfrc tendonactuatorfrc "
+    "ballquat ballangvel jointlimitpos jointlimitvel jointlimitfrc tendonlimitpos tendonlimitvel "
+    "tendonlimitfrc framepos framequat framexaxis frameyaxis framezaxis framelinvel frameangvel framelinacc "
+    "frameangacc subtreecom subtreelinvel subtreeangmom insidesite distance normal fromto contact "
+    "e_potential e_kinetic clock tactile user plugin"
+)
+_IN_BODY = (
+    "body joint freejoint geom site inertial frame replicate attach camera light plugin composite flexcomp"
+)
+_IN_DEFAULT = "default mesh texture material joint geom site camera light pair equality tendon"
+IN_SECTIONS: Mapping[str, str] = {
+    "compiler": "lengthrange",
+    "option": "flag",
+    "size": "",
+    "statistic": "",
+    "visual": "global quality headlight map scale rgba",
+    "default": f"{_IN_DEFAULT} {_MOTORS}",
+    "asset": "mesh hfield skin texture material model",
+    "contact": "pair exclude",
+    "custom": "numeric text tuple",
+    "tendon": "fixed spatial",
+    "equality": "connect weld joint tendon flex flexvert flexstrain distance",
+    "actuator": _MOTORS,
+    "sensor": _SENSORS,
+    "keyframe": "key",
+    "worldbody": _IN_BODY,
+}
+"""Elements of each section; those of extensions and soft bodies are not looked into."""
+
+IN_ELEMENTS: Mapping[str, str] = {
+    "body": _IN_BODY,
+    "frame": _IN_BODY,
+    "replicate": _IN_BODY,
+    "default": f"{_IN_DEFAULT} {_MOTORS}",
+    "geom": "plugin",
+    "mesh": "plugin",
+    "material": "layer",
+    "skin": "bone",
+    "tuple": "element",
+    "fixed": "joint",
+    "spatial": "site geom pulley",
+    "plugin": "config",
+}
+"""Elements inside of an element of a section, by its tag; others hold none."""
+
+_WITHOUT_ATTRIBUTES = frozenset(
+    ["visual", "asset", "contact", "custom", "tendon", "equality", "actuator", "sensor", "keyframe"]
+)
+"""Sections without attributes."""
+
+_CLOSED = frozenset(["composite", "flexcomp"])
+_ALSO_READ: Mapping[str, str] = {
+    "mesh": "class name file face inertia refpos refquat scale vertex",
+    "hfield": "name file elevation ncol nrow size",
+    "texture": "name file type",
+    "material": "class name rgba texture",
+    "camera": "name",
+    "light": "name",
+    "pair": "name geom1 geom2",
+    "exclude": "name body1 body2",
+    "numeric": "name",
+    "text": "name",
+    "tuple": "name",
+    "default": "class",
+    **dict.fromkeys(["layer", "lengthrange", "element"], ""),
+}
+"""Attributes that are read, besides those of `NOT_USED`, of elements whose unknown attributes the reader does
+not refuse."""
+
+
+def unknown_parts(root: Element) -> Iterator[tuple[Element, str]]:
+    """Yield the elements and attributes that MJCF does not have, and that the reader does not refuse: those
+    of one kind together, the first element with a sentence."""
+    found: dict[str, list[Element]] = {}
+    sections = [each for each in root.children if each.tag in IN_SECTIONS]
+    for element in (root, *(section for section in sections if section.tag in _WITHOUT_ATTRIBUTES)):
+        for name in element.attributes:
+            if element is not root or name != "model":
+                found.setdefault(f"unknown attribute {shown(name)} of <{element.tag}>", []).append(element)
+    waiting = [(section, IN_SECTIONS[section.tag]) for section in sections]
+    while waiting:
+        element, known = waiting.pop()
+        for child in element.children:
+            if child.tag not in known.split():
+                found.setdefault(f"unknown element <{child.tag}> in <{element.tag}>", []).append(child)
+            elif child.tag not in _CLOSED:
+                waiting.append((child, IN_ELEMENTS.get(child.tag, "")))
+        if element.tag in _ALSO_READ:
+            listed = " ".join((_ALSO_READ[element.tag], *NOT_USED.get(element.tag, {}).values())).split()
+            for name in element.attributes:
+                if name not in listed:
+                    kind = f"unknown attribute {shown(name)} of <{element.tag}>"
+                    found.setdefault(kind, []).append(element)
+    for words, elements in found.items():
+        times = "" if len(elements) == 1 else f" ({len(elements)} times)"
+        first = min(elements, key=lambda each: each.line)
+        yield first, f"{escaped(words)} was ignored{times}"

@@ -156,6 +156,32 @@ def test_each_attribute_of_the_schema_is_used_or_listed(path: str) -> None:
     assert [name for name in attributes if not is_listed(path, name) and not is_read(path, name)] == []
 
 
+LOOKS = ("size", "statistic", "global", "quality", "headlight", "map", "scale", "rgba", "worldbody")
+"""Elements of which any attribute is accepted: those of drawing and memory."""
+
+
+@pytest.mark.parametrize("what", ["element", "attribute"])
+def test_each_unknown_element_and_attribute_is_an_error_or_named(what: str) -> None:
+    text = document()
+    base = set(dynx.load(text).notes)
+    silent = set()
+    for found in re.finditer(r"<([a-z_0-9]+)((?:\s[^<>]*?)?)(/?)>", text):
+        tag, given, end = found.groups()
+        if what == "attribute":
+            changed = f'<{tag}{given} nonsense="1"{end}>'
+        else:
+            changed = f"<{tag}{given}><nonsense/>{f'</{tag}>' if end else ''}"
+        try:
+            model = dynx.load(text[: found.start()] + changed + text[found.end() :])
+        except DynxError:
+            continue
+        named = any("nonsense" in each.message for each in set(model.notes) - base)
+        left_out = what == "attribute" and tag == "general"  # a note says that the actuators are left out
+        if not named and not left_out and not (what == "attribute" and tag in LOOKS):
+            silent.add(tag)
+    assert silent == set()
+
+
 def test_what_has_an_effect_in_mujoco_is_named_with_its_line() -> None:
     text = document().replace('<geom name="g2"', '<geom name="g2" solref="0.1 1" margin="0.1"')
     text = text.replace('<joint name="k"', '<joint name="k" margin="0.1"')
