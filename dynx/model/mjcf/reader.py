@@ -268,8 +268,7 @@ class _TreeReader:
         actuators, contact_filter = self._read_actuators(tendons), self._contact_filter()
         configurations = self._read_configurations(base)
         self._note_compensation()
-        for element, text in (*unused_attributes(root), *unknown_parts(root)):
-            self._reading.note(element, text)
+        self._note_vocabulary(root)
         self._note_counts(root)
         self._document.options.note(self._reading, scene=False)
         content = self._description(name, base, self._document.options.gravity, self._reading.notes)
@@ -315,6 +314,7 @@ class _TreeReader:
             found.append(MjcfTree(description, tuple(parts.bodies), free, positions, parts.aligned))
         self._require_joints_of_motors(root)
         require_objects(self._document)
+        self._note_vocabulary(root)
         self._note_counts(root)
         return MjcfTrees(
             self._document,
@@ -1030,6 +1030,11 @@ class _TreeReader:
                 )
         reading.ignore_unknown(root, _IN_ROOT | set(_NOT_IN_TREE))
         reading.note_ignored()
+
+    def _note_vocabulary(self, root: Element) -> None:
+        """Add notes on attributes without an effect in dynx, and on what is misspelt."""
+        for element, text in (*unused_attributes(root), *unknown_parts(root)):
+            self._reading.note(element, text)
 
     def _note_counts(self, root: Element) -> None:
         for kind, ((what, element), *others) in self._held.items():
