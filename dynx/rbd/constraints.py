@@ -22,7 +22,8 @@ Sweeps converge linearly, and slowly where a heavy body rests on a light one.
 **Newton's method** ends what sweeps begin, on floats: the conditions above are equations F(x) = 0 with
 F = g (x - projection of x - w / g) in m/s, which are piecewise smooth (Alart and Curnier, A mixed formulation
 for frictional contact problems prone to Newton like solution methods, 1991). Redundant contacts make its
-matrix singular; a small multiple of g on its diagonal selects the impulses closest to the ones before.
+matrix singular; a small multiple of g on its diagonal, which falls with F (Levenberg and Marquardt), selects
+the impulses closest to the ones before.
 """
 
 from __future__ import annotations
@@ -246,20 +247,39 @@ TOLERANCE = 1e-12
 ROUNDING = 16.0 * FLOAT64_EPS
 """Residual relative to the largest sum of |G| |x| that is rounding."""
 
-PROXIMAL = 1e-9
-"""Part of g on the diagonal of Newton's matrix, which redundant contacts make singular."""
+LEAST_PROXIMAL, MOST_PROXIMAL = 1e-9, 1e-3
+"""Bounds of the part of g on the diagonal of Newton's matrix. Redundant contacts make the matrix singular,
+and far from the solution large steps lead to wrong modes."""
 
-NEWTON_STEPS = 25
+NEWTON_STEPS = 40
 """Number of Newton's steps from one start."""
 
-CAUTIOUS_PROXIMAL = 1e-2
-"""The same part in every third step from `CAUTIOUS_FROM` on, which ends cycles between sets of modes."""
-
 CAUTIOUS_FROM = 10
+"""Step from which on every third has the largest part, which ends cycles between sets of modes."""
 
-ATTEMPTS = ((0, 1.0), (10, 0.3), (10, 3.0), (20, 1.0), (20, 0.3), (40, 3.0), (40, 1.0), (80, 0.3), (80, 3.0))
-"""Number of sweeps before each attempt of Newton's method, and the factor of g in its projections. The factor
-changes no solution, but the modes between which an attempt that failed has cycled."""
+
+class Attempt(NamedTuple):
+    """An attempt of Newton's method, which fails where modes cycle or steps are too short."""
+
+    sweeps: int
+    """Number of sweeps before it."""
+    factor: float
+    """Factor of g in its projections, which changes no solution, but the modes on the way."""
+    proximal: float
+    """Part of g on the diagonal, times the largest entry of F relative to that of c."""
+
+
+ATTEMPTS = (
+    Attempt(0, 1.0, 1e-3),
+    Attempt(0, 1.0, 0.0),
+    Attempt(10, 0.3, 1e-3),
+    Attempt(10, 3.0, 0.0),
+    Attempt(20, 1.0, 1e-3),
+    Attempt(40, 0.3, 0.0),
+    Attempt(40, 3.0, 1e-3),
+    Attempt(80, 1.0, 0.0),
+    Attempt(80, 0.3, 1e-3),
+)
 
 
 def solve(
@@ -284,20 +304,20 @@ def solve(
     newton = _Newton(sets, G, c, np.array(numbers, dtype=np.float64), limits, floors)
     rounding = ROUNDING * np.abs(G)
     best, least, taken = at, math.inf, 0
-    for sweeps, factor in ATTEMPTS:
+    for attempt in ATTEMPTS:
         w: Floats = c + G @ at
-        for _ in range(sweeps):
+        for _ in range(attempt.sweeps):
             at, w, _ = sweep(sets, G, numbers, limits, floors, at, w)
         x = at
         for count in range(NEWTON_STEPS):
             cautious = count >= CAUTIOUS_FROM and count % 3 == 0
-            error, step = newton.step(x, factor, CAUTIOUS_PROXIMAL if cautious else PROXIMAL)
+            error, step = newton.step(x, attempt, cautious=cautious)
             if error < least:
                 best, least = x, error
             if step is None or error <= tolerance:
                 break
             x = x + step
-        taken += sweeps + count
+        taken += attempt.sweeps + count
         if least <= max(tolerance, float((rounding @ np.abs(best)).max(initial=0.0))):
             break
     w = c + G @ best
@@ -336,13 +356,14 @@ class _Newton:
         self, sets: ConstraintSets, G: Floats, c: Floats, g: Floats, limits: Floats, floors: Floats
     ) -> None:
         self._G, self._c, self._g = G, c, g
+        self._speed = float(np.abs(c).max(initial=0.0)) + TINY
         self._unilateral = np.array(sets.unilateral, dtype=np.intp)
         self._floors = floors[self._unilateral]
         self._disks = [disks for rows in (1, 2) if (disks := _Disks(sets, limits, rows)).count]
 
-    def step(self, x: Floats, factor: float, proximal: float) -> tuple[float, Floats | None]:
-        """Return the largest entry of F at x (m,), whose projections are those of x - w / (factor g), and
-        Newton's step; None where there is no finite one."""
+    def step(self, x: Floats, attempt: Attempt, *, cautious: bool) -> tuple[float, Floats | None]:
+        """Return the largest entry of F at x (m,), and Newton's step; None where there is no finite one."""
+        factor = attempt.factor
         G, g = self._G, factor * self._g
         w = self._c + G @ x
         wanted = x - w / g
@@ -359,7 +380,10 @@ class _Newton:
         for disks in self._disks:
             disks.add(F, J, x, wanted, projected, follows, G, g)
         error = float(np.abs(F).max(initial=0.0)) / min(factor, 1.0)
-        J.flat[:: len(x) + 1] += proximal * self._g
+        part = MOST_PROXIMAL
+        if not cautious:
+            part = min(max(attempt.proximal * error / self._speed, LEAST_PROXIMAL), MOST_PROXIMAL)
+        J.flat[:: len(x) + 1] += part * self._g
         try:
             step = np.linalg.solve(J, -F)
         except np.linalg.LinAlgError:
