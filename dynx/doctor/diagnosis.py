@@ -31,6 +31,7 @@ from dynx.doctor.examination import (
     ReferenceValues,
     deepest_contact,
     describe_contacts,
+    model_without_mimics,
     referee_error,
     require_bounded,
     with_original_lines,
@@ -554,14 +555,23 @@ def compare_as_loaded(
 def _of_format(
     case: Case, examiner: Examiner, variants: Examiner, engines: Sequence[str] | None
 ) -> tuple[Examiner, Examiner]:
-    """Leave out the engines that load no file of the format of the case, unless the user named them."""
+    """Leave out the engines that load no file of the format of the case, or no ball joints if it has some,
+    unless the user named them; raise UnsupportedFeatureError if a named engine takes no ball joints."""
     if case.form == "urdf":
         return examiner, variants
     if engines is None:
         examiner = examiner.for_format(case.form)
         if not examiner.engines:
             raise ArgumentError(f"no engine that is installed loads {format_name(case.form)}")
-    return examiner, variants.for_format(case.form)
+    variants = variants.for_format(case.form)
+    model = model_without_mimics(case.source, case.base)
+    if model.ball_joints:
+        taking = examiner.for_ball_joints()
+        for name in examiner.engines:
+            if name not in taking.engines and (engines is not None or not taking.engines):
+                refuse_ball_joints(model, f"the comparison of files as {shown(name)} loads them")
+        examiner, variants = taking, variants.for_ball_joints()
+    return examiner, variants
 
 
 def open_case(robot: Robot, base: Base | None, choices: Mapping[str, str]) -> Case:
@@ -580,7 +590,6 @@ def open_case(robot: Robot, base: Base | None, choices: Mapping[str, str]) -> Ca
     if case.form == "urdf":
         return case
     model = read_model(document.text_with_lines_before, document.source, base=base)
-    refuse_ball_joints(model, "the doctor")
     return replace(case, base=model.base)
 
 

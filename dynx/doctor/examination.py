@@ -43,6 +43,7 @@ from dynx.rules.geometry import (
 )
 from dynx.rules.inertia import has_inertial_data
 from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_exp, quat_log
 from dynx.workers import Workers
 
 # Collision meshes for PyBullet's plain call, each replaced by the eight corners of its bounding box.
@@ -304,7 +305,7 @@ def links_in_contact(case: Case, engine: str, seed: int) -> Mapping[tuple[str, s
                 contact.states += 1
                 if depth > contact.depth:
                     contact.depth = depth
-                    contact.positions = dict(zip(model.joint_names, q[base:].tolist(), strict=True))
+                    contact.positions = dict(zip(model.position_names, q[base:].tolist(), strict=True))
     return found
 
 
@@ -324,12 +325,12 @@ def following_positions(case: Case, count: int, seed: int) -> Floats:
     free, model = model_without_mimics(case.source, case.base), case.model
     q = draw_states(model, count, seed).q
     base = 7 if model.floating else 0
-    columns = {joint.name: q[:, base + k] for k, joint in enumerate(model.coordinate_joints)}
+    columns = {name: q[:, base + k] for k, name in enumerate(model.position_names)}
     for joint in model.joints:
         if joint.mimic is not None and joint.mimic.joint in columns:
             columns[joint.name] = joint.mimic.multiplier * columns[joint.mimic.joint] + joint.mimic.offset
     held = np.zeros(count)
-    return np.column_stack([q[:, :base], *(columns.get(name, held) for name in free.joint_names)])
+    return np.column_stack([q[:, :base], *(columns.get(name, held) for name in free.position_names)])
 
 
 # Reference values for a file: the robot as dynx reads it, evaluated by the algorithms of `dynx.rbd`.
@@ -422,21 +423,26 @@ def draw_states(model: Model, count: int, seed: int) -> States:
     velocities and accelerations up to 2.
 
     Engines that compute a step apply a force at a limit, so no limit may be reached within a step. For a
-    range of zero width, positions are drawn as without limits.
+    range of zero width, positions are drawn as without limits. A ball joint is turned by nine tenths of a
+    random rotation within its largest angle.
     """
     rng = np.random.default_rng(seed)
-    base = 7 if model.floating else 0
     q = model.random(rng, count)
-    turning = np.array([joint.type != "prismatic" for joint in model.coordinate_joints], dtype=bool)
+    for first in model.ball_places:
+        quat = slice(first, first + 4)
+        q[:, quat] = quat_exp(0.9 * quat_log(q[:, quat]))
+    joints = [joint for joint in model.coordinate_joints if joint.type != "ball"]
+    places = [model.position_index(joint.name) for joint in joints]
+    turning = np.array([joint.type != "prismatic" for joint in joints], dtype=bool)
     reach = np.where(turning, np.pi, 1.0)
-    lower, upper = model.lower[base:], model.upper[base:]
+    lower, upper = model.lower[places], model.upper[places]
     # If zero is outside the limits, positions near the closest limit are drawn.
     near = np.clip(0.0, lower, np.maximum(upper, lower))
     near = np.where((np.abs(near) < reach) | (np.abs(near) > MAX_LIMIT_DISTANCE), 0.0, near)
     low, high = np.maximum(lower, near - reach), np.minimum(upper, near + reach)
     room = low < high
     low, high = np.where(room, low, -reach), np.where(room, high, reach)
-    q[:, base:] = low + (high - low) * rng.uniform(0.1, 0.9, (count, model.nq - base))
+    q[:, places] = low + (high - low) * rng.uniform(0.1, 0.9, (count, len(places)))
     v, a, tau = rng.uniform(-2.0, 2.0, (3, count, model.nv))
     return States(q, v, a, tau)
 
@@ -445,7 +451,7 @@ def with_positions(model: Model, states: States, positions: Mapping[str, float])
     """Add a state: the first one, with these joints at these positions."""
     q = states.q[0].copy()
     base = 7 if model.floating else 0
-    for k, name in enumerate(model.joint_names):
+    for k, name in enumerate(model.position_names):
         q[base + k] = positions.get(name, q[base + k])
     added = (q, states.v[0], states.a[0], states.tau[0])
     columns = (states.q, states.v, states.a, states.tau)
@@ -734,6 +740,11 @@ class Examiner:
         loading = [name for name, kind in self.engines.items() if form in kind.FORMATS]
         return Examiner(loading, self._samples, self.seed, self._positions, self._apart)
 
+    def for_ball_joints(self) -> Examiner:
+        """Return an examiner with those of the engines that take ball joints."""
+        taking = [name for name, kind in self.engines.items() if kind.takes_ball_joints]
+        return Examiner(taking, self._samples, self.seed, self._positions, self._apart)
+
     def close(self) -> None:
         """End the process in which engines load MJCF and SDF."""
         self._apart.close()
@@ -952,7 +963,7 @@ def max_change(before: Mapping[str, Floats], after: Mapping[str, Floats]) -> flo
 def coordinate_names(reference: ReferenceValues) -> tuple[str, ...]:
     """Return the names of the entries of v."""
     base = ("base x", "base y", "base z", "base roll", "base pitch", "base yaw")
-    return (base if reference.model.floating else ()) + reference.model.joint_names
+    return (base if reference.model.floating else ()) + reference.model.coordinate_names
 
 
 def _number(ratio: float) -> float:

@@ -64,7 +64,7 @@ def of_file(act: Callable[[str], object]) -> Callable[[Path], object]:
 def loaded(path: str) -> object:
     from dynx.loaded import load_as
 
-    return load_as("mujoco", path, MODEL)
+    return load_as("pinocchio", path, MODEL)
 
 
 def raised(report: dynx.DoctorReport | dynx.AgreementReport) -> object:
@@ -114,6 +114,8 @@ REFUSED: dict[str, Callable[[Path], object]] = {
         MODEL, control.PD(MODEL, kp=1.0, kd=1.0), MODEL.neutral(), rollouts=2, duration=0.1
     ),
     "agree with PyBullet": lambda folder: raised(dynx.agree(MODEL, ["reference", "pybullet"])),
+    "diagnose with Drake": of_file(lambda path: raised(dynx.diagnose(path, engines=["drake"]))),
+    "load_as Pinocchio": of_file(loaded),
     "a world on PyBullet": lambda folder: world_on("pybullet"),
     "a world on Drake": lambda folder: world_on("drake"),
     "a motor": lambda folder: dynx.world.SceneRobot("arm", MODEL, motors=dynx.world.VelocityMotor(0.0, 1.0)),
@@ -128,9 +130,6 @@ REFUSED: dict[str, Callable[[Path], object]] = {
     "same_robot of models": lambda folder: dynx.same_robot(MODEL, STRAIGHT),
     "same_robot of files": of_file(lambda path: dynx.same_robot(path, path)),
     "diagnose a model": lambda folder: raised(dynx.diagnose(MODEL)),
-    "diagnose a file": of_file(lambda path: raised(dynx.diagnose(path))),
-    "compare_as_loaded": of_file(lambda path: raised(dynx.compare_as_loaded(path))),
-    "load_as": of_file(loaded),
     "dynx/Reach": of_file(reach),
     "lock": lambda folder: dynx.load(MODEL, lock={"shoulder": 0.1}),
 }
@@ -146,12 +145,12 @@ COMMANDS_THAT_COMPUTE = (
     ("agree", "ROBOT", "--backends", "reference,compiled"),
     ("agree", "ROBOT", "--samples", "3"),
     ("sim", "ROBOT", "--duration", "0.1"),
+    ("doctor", "ROBOT"),
     ("ik", "ROBOT", "--target", "0,0,0.4", "--frame", "hand"),
 )
 COMMANDS_THAT_REFUSE = (
     ("id", "ROBOT", "--v", "shoulder=1"),
     ("convert", "ROBOT", "--to", "urdf"),
-    ("doctor", "ROBOT"),
     ("same", "ROBOT", "ROBOT"),
 )
 

@@ -120,7 +120,8 @@ def test_motors_act_on_other_joints(engine: str) -> None:
                 world.step(motors={"arm": everything})
 
 
-def test_a_rod_on_a_ball_joint_falls_on_the_ground(tmp_path: Path) -> None:
+@pytest.mark.parametrize("engine", ["dynx", "mujoco"])
+def test_a_rod_on_a_ball_joint_falls_on_the_ground(engine: str, tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     path = tmp_path / "scene.xml"
     path.write_text(
@@ -128,7 +129,7 @@ def test_a_rod_on_a_ball_joint_falls_on_the_ground(tmp_path: Path) -> None:
         <body name="rod" pos="0 0 0.3"><joint name="pivot" type="ball"/>
         <geom type="capsule" fromto="0 0 0.1 0.8 0 0.1" size="0.05" mass="1"/></body></worldbody></mujoco>"""
     )
-    with World(read_scene(path), "mujoco", dt=1e-3) as world:
+    with World(read_scene(path), engine, dt=1e-3) as world:
         world.step(2000)
         (name,) = [robot.name for robot in world.scene.robots]
         assert world.contacts()
@@ -213,3 +214,18 @@ def test_an_exported_world_moves_alike() -> None:
         shoulder = model.position_index("shoulder")
         q = world.state.robots["arm"].q
         np.testing.assert_allclose(q[shoulder : shoulder + 4], np.roll(data.qpos[7:11], -1), atol=1e-9)
+
+
+def test_contacts_and_limits_together_are_refused_by_name(tmp_path: Path) -> None:
+    """The impulses of dynx's own engine have no largest angle."""
+    path = tmp_path / "scene.xml"
+    path.write_text(
+        """<mujoco><worldbody><geom type="plane" size="0 0 1"/>
+        <body name="rod" pos="0 0 0.3"><joint name="pivot" type="ball" range="0 1"/>
+        <geom type="capsule" fromto="0 0 0.1 0.8 0 0.1" size="0.05" mass="1"/></body></worldbody></mujoco>"""
+    )
+    scene = read_scene(path)
+    with pytest.raises(UnsupportedFeatureError, match="ball joint 'pivot'"):
+        World(scene, "dynx", dt=1e-3)
+    with World(scene, "dynx", dt=1e-3, joint_limits=False) as world:
+        world.step(2)

@@ -1,0 +1,63 @@
+"""The doctor on files with ball joints: MuJoCo, which takes them, is compared with dynx."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.doctor.examination import draw_states
+from dynx.model import JointDynamics, Limits
+from dynx.model.limited_positions import limited_positions
+from tests.sim.test_ball_joints import arm, each_base
+
+pytest.importorskip("mujoco")
+
+
+def written(folder: Path, text: str) -> str:
+    path = folder / "arm.xml"
+    path.write_text(text)
+    return str(path)
+
+
+@each_base
+def test_a_file_that_mujoco_loads_alike(base: Any, tmp_path: Path) -> None:
+    path = written(tmp_path, arm(base).to_mjcf())
+    for report in (dynx.diagnose(path), dynx.compare_as_loaded(path)):
+        assert report.error is None
+        assert report.alike
+        assert [each.engine for each in report.engines] == ["mujoco"]
+
+
+def test_joint_dynamics_of_a_ball_joint_are_causes(tmp_path: Path) -> None:
+    """MuJoCo's inverse dynamics has damping, friction and armature of the file about each axis."""
+    path = written(tmp_path, arm("fixed", JointDynamics(0.1, 0.2, 0.3)).to_mjcf())
+    report = dynx.diagnose(path)
+    assert not report.alike
+    assert report.explained
+    causes = {finding.name for finding in report.findings if finding.kind == "difference"}
+    assert causes == {
+        "damping-in-inverse-dynamics",
+        "friction-in-inverse-dynamics",
+        "armature-in-mass-matrix",
+    }
+
+
+def test_states_turn_a_ball_joint_about_every_axis_within_its_limit() -> None:
+    model = arm()
+    states = draw_states(model, 50, 0)
+    assert np.all(np.ptp(states.q[:, :4], axis=0) > 0.5)
+    limited = draw_states(arm(limits=Limits(upper=0.5)), 50, 0)
+    angle = limited_positions(model, limited.q)[:, 0]
+    assert 0.3 < np.max(angle) <= 0.45
+
+
+def test_an_engine_that_is_named_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, arm().to_mjcf())
+    report = dynx.diagnose(path, engines=["mujoco", "pinocchio"])
+    assert report.error is not None
+    assert "'shoulder'" in report.error.message
+    assert "as 'pinocchio' loads them" in report.error.message
