@@ -32,7 +32,7 @@ a robot with a fixed base, because the poses of its few joints have many zeros."
 def inverse_dynamics_derivatives(mechanism: Mechanism) -> Program:
     """Return the program of q, v and a, with the outputs dtau_dq, dtau_dv and dtau_da, each (nv, nv)."""
     shapes = argument_shapes(mechanism, "qva")
-    if mechanism.balls or (not mechanism.floating and pair_count(mechanism) <= MAX_DIFFERENTIATED_PAIRS):
+    if not mechanism.floating and pair_count(mechanism) <= MAX_DIFFERENTIATED_PAIRS:
         program = _differentiated_torque(mechanism)
         return trace(lambda q, v, a: _torque_derivatives(program, q, v, a), shapes)
     return trace(lambda q, v, a: _closed_form(mechanism, q, v, a), shapes)

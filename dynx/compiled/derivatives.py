@@ -2,8 +2,8 @@
 
 There is no step size. For small robots the graph of the algorithm itself is differentiated
 (`dynx.simd.differentiate`); for others a closed form (`dynx.rbd.derivatives`) gives shorter code. For large
-ones that is evaluated by routines, which are compiled once for all robots (`dynx.compiled.table_loops`). With
-mimic joints, derivatives are by the coordinates of the model.
+ones that is evaluated by routines, which are compiled once for all robots (`dynx.compiled.table_loops`), and
+for large ones with ball joints by NumPy. With mimic joints, derivatives are by the coordinates of the model.
 
 Forward dynamics is differentiated by the implicit function theorem: at a = FD(q, v, tau) the torque
 ID(q, v, a) stays tau, so
@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.backends.arguments import Arguments
+from dynx.backends.evaluation import common_batch
 from dynx.backends.solvability import Solvability
 from dynx.compiled import derivative_programs as programs
 from dynx.compiled.backend import CompiledBackend
@@ -33,6 +34,7 @@ from dynx.compiled.robot_kernel import Making, RobotKernels
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.table_kernels import derivatives_kernel
 from dynx.model import Model
+from dynx.rbd.derivatives import inverse_dynamics_derivatives
 from dynx.simd.call_table import TableKernel
 from dynx.spatial.scalar import Floats
 
@@ -138,6 +140,10 @@ class Derivatives:
 
     def _by_routines(self, arrays: list[Floats]) -> InverseDynamicsDerivatives:
         mechanism = self.model.mechanism
+        if mechanism.balls:
+            # Routines have no ball joints: NumPy evaluates the closed form.
+            arrays = [np.broadcast_to(x, (*common_batch(*arrays), x.shape[-1])) for x in arrays]
+            return InverseDynamicsDerivatives(*inverse_dynamics_derivatives(mechanism, *arrays))
         found = self._kernels.run(self._routines, list(tree_coordinates(mechanism, *arrays)))
         if mechanism.coupling is None:
             return InverseDynamicsDerivatives(*found)

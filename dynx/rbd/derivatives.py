@@ -22,12 +22,12 @@ by its coordinates follow from these by the chain rule.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.errors import UnsupportedFeatureError
 from dynx.model.mechanism import Body, Mechanism
 from dynx.rbd.loops import Loops, PythonLoops
 from dynx.rbd.placement import Placement, SpatialVector
@@ -134,25 +134,27 @@ def inverse_dynamics_derivatives(
 ) -> tuple[Array, ...]:
     """Return dtau/dq, dtau/dv and dtau/da (..., nv, nv) in tree coordinates, at q (..., nq), v, a (..., nv).
 
-    With a floating base the derivative by q is the one by a displacement in the axes of the base.
+    With a floating base the derivative by q is the one by a displacement in the axes of the base, and with a
+    ball joint by a rotation in the axes of its child.
     """
-    if mechanism.balls:
-        raise UnsupportedFeatureError(
-            f"{mechanism.name} has a ball joint, of which there are no derivatives in closed form"
-        )
     loops = loops or PythonLoops(mechanism)
     if mechanism.floating:
         base = loops.root(Base.of, q, v)
         root = loops.root(_floating_root, base, a)
     else:
         base, root = None, loops.root(_fixed_root)
-    _, moved = loops.outward(_move, root, q, v, a)
-    joints = [body.joint for body in moved]
+    has_balls = bool(mechanism.balls)
+    motions, moved = loops.outward(_move_with_balls if has_balls else _move, root, q, v, a)
+    joints: Sequence[Any] = [body.joint for body in moved]
+    if has_balls:
+        carriers = [motions[carrier + 1] for carrier in mechanism.axis_carriers]
+        joints = loops.each(_joint_of_ball, joints, carriers)
     bodies = [loops.root(_root_subtree, root), *(body.subtree for body in moved)]
     subtrees = loops.subtrees(_add_subtree, bodies)
     matrices = loops.matrices(3, like=v)
+    start, pair = (_respond_in_ball, _entries_with_balls) if has_balls else (_respond, _entries)
     loops.to_root(
-        matrices, _respond, _entries, _base_entries, own=(subtrees, joints), here=(joints,), at_base=(base,)
+        matrices, start, pair, _base_entries, own=(subtrees, joints), here=(joints,), at_base=(base,)
     )
     if mechanism.floating:
         loops.base_block(matrices, _base_block, subtrees[0], base)
@@ -195,9 +197,13 @@ def _entries(
     return response, by_ancestor(response, joint), of_ancestor(response, joint)
 
 
-def _base_entries(response: JointResponse, base: Base) -> tuple[Entries, tuple[list[Array], ...]]:
+def _base_entries(
+    response: JointResponse | _BallResponse, base: Base
+) -> tuple[Entries, tuple[list[Array], ...]]:
     """Return the derivatives of the torque of the joint by the coordinates of a floating base, and those of
     the base's wrench by the coordinate of the joint."""
+    if isinstance(response, _BallResponse):
+        response = response.response
     columns = by_base(response.IS, response.BS, base)
     wrenches = (np.concatenate(x, axis=-1) for x in (response.by_q, response.by_v, response.IS))
     return columns, tuple([wrench[..., k] for k in range(6)] for wrench in wrenches)
@@ -279,6 +285,89 @@ def _base_block(mechanism: Mechanism, subtree: Subtree, base: Base) -> tuple[lis
 def _cross_motion(a: SpatialVector, b: SpatialVector) -> SpatialVector:
     """Return a x b for motions."""
     return cross(a[1], b[0]) + cross(a[0], b[1]), cross(a[1], b[1])
+
+
+@dataclass(frozen=True)
+class _MotionInBall(BodyMotion):
+    """Motion of one of the three bodies of a ball joint, and the velocity and acceleration of the body that
+    carries the joint."""
+
+    carried: tuple[SpatialVector, SpatialVector]
+
+
+class _BallJointMotion(NamedTuple):
+    """`JointMotion` of any joint of a robot with ball joints, and the time derivative of S: v x S with the
+    velocity of the child, S' of a joint with one coordinate. `ball` is the name of a ball joint."""
+
+    motion: JointMotion
+    rate: SpatialVector
+    ball: str
+
+
+class _BallResponse(NamedTuple):
+    """`JointResponse`, its part by q without that of the wrench S x* F of the subtree, and the ball joint."""
+
+    response: JointResponse
+    by_q_inside: SpatialVector
+    ball: str
+
+
+def _move_with_balls(
+    body: Body, parent: BodyMotion, q: Array, v: Array, a: Array
+) -> tuple[BodyMotion, MovedSubtree]:
+    """Do as `_move`; the axes of a ball joint are fixed to its child.
+
+    So S' and S'' of all three are those with the velocity and acceleration of the body that carries the joint
+    (Singh, Russell and Wensing 2022, for joints with several axes).
+    """
+    if body.ball is None:
+        return _move(body, parent, q, v, a)
+    carried = parent.carried if isinstance(parent, _MotionInBall) and body.ball else None
+    velocity, acceleration = carried or (parent.velocity, parent.acceleration)
+    motion, joint = move_child(body, replace(parent, velocity=velocity, acceleration=acceleration), q, v, a)
+    inside = _MotionInBall(
+        motion.R,
+        motion.p,
+        add_spatial(parent.velocity, _scaled(joint.S, v)),
+        add_spatial(parent.acceleration, add_spatial(_scaled(joint.S, a), _scaled(joint.first, v))),
+        (velocity, acceleration),
+    )
+    return inside, MovedSubtree(joint, Subtree.of_body(body.inertia, inside))
+
+
+def _joint_of_ball(body: Body, joint: JointMotion, carrier: BodyMotion) -> _BallJointMotion:
+    if body.ball is None:
+        return _BallJointMotion(joint, joint.first, "")
+    return _BallJointMotion(joint, _cross_motion(carrier.velocity, joint.S), body.joint)
+
+
+def _respond_in_ball(body: Body, subtree: Subtree, joint: _BallJointMotion) -> tuple[_BallResponse, Entries]:
+    found, motion = respond(subtree, joint.motion), joint.motion
+    by_v = add_spatial(found.by_v, subtree.inertia.momentum(*_less(joint.rate, motion.first)))
+    force, moment = subtree.wrench
+    linear, angular = motion.S
+    turned = cross(angular, force), cross(angular, moment) + cross(linear, force)
+    response = _BallResponse(found._replace(by_v=by_v), _less(found.by_q, turned), joint.ball)
+    return response, _by_ancestor_in_ball(response, joint)
+
+
+def _by_ancestor_in_ball(response: _BallResponse, joint: _BallJointMotion) -> Entries:
+    entries, IS = by_ancestor(response.response, joint.motion), response.response.IS
+    return entries._replace(by_v=entries.by_v + _dot(IS, _less(joint.rate, joint.motion.first)))
+
+
+def _entries_with_balls(
+    body: Body, response: _BallResponse, joint: _BallJointMotion
+) -> tuple[_BallResponse, Entries, Entries]:
+    found = of_ancestor(response.response, joint.motion)
+    if response.ball and response.ball == joint.ball:
+        # The axes of one ball joint move together: none carries the wrench of another.
+        found = found._replace(by_q=_dot(joint.motion.S, response.by_q_inside))
+    return response, _by_ancestor_in_ball(response, joint), found
+
+
+def _less(a: SpatialVector, b: SpatialVector) -> SpatialVector:
+    return a[0] - b[0], a[1] - b[1]
 
 
 def _twice(a: SpatialVector) -> SpatialVector:

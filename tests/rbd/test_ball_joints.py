@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,13 +17,16 @@ from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.referee import Referee
 from dynx.agreement.sampling import draw_samples
 from dynx.backends import backend
-from dynx.errors import UnsupportedFeatureError
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.rbd.derivatives import inverse_dynamics_derivatives
+from dynx.rbd.rnea import inverse_dynamics
+from dynx.spatial.manifold import displace
+from dynx.spatial.scalar import Array, sqrt
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.testing.strategies import models
 from tests.error_bounds import ErrorBounds, samples_at
 from tests.examples import PROFILE
+from tests.rbd.exact import IDENTITY_TOLERANCE, STEP, distance, exact_mechanism, exactly, fifty_digits
 
 KINDS = ("ball", "revolute", "prismatic", "continuous", "fixed")
 BODY = Inertial(1.5, Pose((0.1, -0.2, 0.3), (0.3, -0.2, 0.5)), 0.04, 0.004, -0.003, 0.05, 0.002, 0.03)
@@ -112,8 +116,37 @@ def test_reference_equals_the_referee(data: st.DataObject) -> None:
                 assert found.agree, found
 
 
-def test_derivatives_are_refused_by_name() -> None:
-    model = Model.build("arm", [Link("base"), Link("hand", BODY)], [Joint("b", "ball", "base", "hand")])
-    q, v = model.neutral(), np.zeros(3)
-    with pytest.raises(UnsupportedFeatureError, match="arm has a ball joint"):
-        inverse_dynamics_derivatives(model.mechanism, q, v, v)
+@each_base
+@given(data=st.data())
+@settings(max_examples=max(4, PROFILE // 16))
+def test_derivatives_in_closed_form_hold_in_50_digits(base: Base, data: st.DataObject) -> None:
+    """They are central differences along a rotation in the axes of each child, to 24 digits."""
+    model = data.draw(ball_robots(base))
+    if not model.nv:
+        return
+    rng = np.random.default_rng(data.draw(st.integers(0, 9)))
+    q, (v, a) = model.random(rng), rng.uniform(-1.0, 1.0, (2, model.nv))
+
+    def on_sphere(q: Array) -> Array:
+        q = q.copy()
+        for first in model.quaternions:
+            quat = q[first : first + 4]
+            q[first : first + 4] = quat / sqrt(np.sum(quat * quat))
+        return q
+
+    def moved(q: Array, d: Array) -> Array:
+        return on_sphere(displace(q, d, floating=model.floating, balls=model.ball_places))
+
+    with fifty_digits():
+        exact, h = exact_mechanism(model), mpmath.mpf(10) ** -STEP
+        q, v, a = on_sphere(exactly(q)), exactly(v), exactly(a)
+        found = inverse_dynamics_derivatives(exact, q, v, a)
+        k = data.draw(st.integers(0, model.nv - 1))
+        step = exactly(np.eye(model.nv)[k]) * h
+        pairs = [
+            [inverse_dynamics(exact, moved(q, sign * step), v, a) for sign in (1, -1)],
+            [inverse_dynamics(exact, q, v + sign * step, a) for sign in (1, -1)],
+            [inverse_dynamics(exact, q, v, a + sign * step) for sign in (1, -1)],
+        ]
+        for matrix, (plus, minus) in zip(found, pairs, strict=True):
+            assert distance(matrix[:, k], (plus - minus) / (2 * h)) <= IDENTITY_TOLERANCE
