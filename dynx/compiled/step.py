@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, pi, sin
 from typing import Any, NamedTuple
 
 from dynx.compiled.status import Status
@@ -157,4 +157,11 @@ def position_excess(model: Model, start: Array, q: Array, found: Any = 0.0) -> A
         beyond += [x - high] if isfinite(upper) else []
         for each in beyond:
             found = as_symbol(each).maximum(found)
+    for joint in model.ball_joints:
+        if joint.limits.upper < pi:
+            # Squared sines of half the angles, which grow with these up to pi.
+            first = model.position_index(joint.name)
+            before, now = (sum(x * x for x in each[first : first + 3]) for each in (start, q))
+            bound = as_symbol(before).maximum(sin(0.5 * joint.limits.upper) ** 2)
+            found = as_symbol(now - bound).maximum(found)
     return found

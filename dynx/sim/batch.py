@@ -34,7 +34,6 @@ from dynx.files.arrays import read_arrays, write_arrays
 from dynx.files.reading import checked_path
 from dynx.files.writing import clear_unfinished
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import MAX_INDEX, array_of, checked_array, real_array, whole_number
 from dynx.sim.batch_rollouts import BatchRollouts
@@ -46,7 +45,7 @@ from dynx.sim.scenario.options import COEFFICIENTS as COEFFICIENTS_KIND
 from dynx.sim.scenario.options import FORMER_NAMES, OPTIONS, option, takes
 from dynx.sim.scenario.scenario import Scenario, ScenarioArguments
 from dynx.sim.setup import Setup, require_duration
-from dynx.sim.step_completion import LaneStops, Settling, stops_balls
+from dynx.sim.step_completion import BallLaneStops, LaneStops, Settling
 from dynx.simd.call_sequence import Integers
 from dynx.simd.kernel import Kernel
 from dynx.simd.machine import require_memory
@@ -112,7 +111,7 @@ class BatchPart:
     """Whether the kernel of each step has pushes."""
     noise: PartNoise | None
     record_every: int
-    stops: LaneStops | None
+    stops: LaneStops | BallLaneStops | None
 
     def __call__(self) -> PartOutcome:
         """Simulate the rollouts of the part."""
@@ -675,8 +674,6 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
         wrenches = acting.wrenches(clock.dt, np.arange(clock.n_steps))
     pushed = step.pushed_steps(wrenches).tolist()
     kernels = _step_kernels(step, clock, pushed)
-    if scenario.joint_limits and stops_balls(moved):
-        refuse_ball_joints(moved, "simulate_batch with joint limits (joint_limits=False leaves them out)")
     stops = LaneStops.of(step) if scenario.joint_limits else None
     references = setup.setpoint_of(clock.times()[1:]).q
     setpoints = Setpoint(*setup.setpoint_of(clock.control_times(controller.lead)))

@@ -28,7 +28,7 @@ from dynx.sim.closed_loop import MIN_STEPS_TO_COMPILE, ClosedLoop, LoopState, St
 from dynx.sim.loop_step import CONTROLLER, SETPOINT, ArrayDisturbances, LoopStep, cut_step
 from dynx.sim.own_controllers import refuse_irreproducible
 from dynx.sim.plants.integrated import IntegratedPlant
-from dynx.sim.step_completion import LaneStops, Settling, stops_balls
+from dynx.sim.step_completion import LaneStops, Settling
 from dynx.simd.call_sequence import Integers, StridedRows
 from dynx.simd.cuts import BoundCuts, CutStep, EngineCallFailed
 from dynx.spatial.scalar import Floats, clamp
@@ -64,8 +64,6 @@ def lane_loop(loop: ClosedLoop) -> LaneLoop | None:
     """Compile a loop as one lane of a batch's kernel; return None where that is impossible."""
     plant = loop.plant
     if not isinstance(plant, IntegratedPlant) or not is_one_lane(plant, loop.controller):
-        return None
-    if loop.stops is not None and stops_balls(plant.model):
         return None
     # A controller is evaluated on numbers too, where its own defects may warn before they are found.
     with suppress(*NOT_COMPILED), np.errstate(over="ignore", invalid="ignore", divide="ignore"):

@@ -10,7 +10,7 @@ velocities after the impact for the lanes in which such a joint moves outwards, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -28,7 +28,7 @@ from dynx.sim.loop_step import LoopStep
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Array, Floats
 from dynx.steppers.implicit_joints import BLOCK_CORRECTIONS, MAX_SOLUTIONS
-from dynx.steppers.joint_stops import held_at_limits, velocity_after_impact
+from dynx.steppers.joint_stops import JointStops, held_at_limits, velocity_after_impact
 from dynx.steppers.layout import stop_positions
 
 Rows = NDArray[np.signedinteger[Any]]
@@ -64,11 +64,6 @@ class Settling:
             modes[group] = one_by_one[group] = 0.0
 
 
-def stops_balls(model: Model) -> bool:
-    """Check whether a robot has both ball joints and joints with limits, whose stops are not compiled."""
-    return bool(model.ball_joints) and bool(np.isfinite(joint_ranges(model)).any())
-
-
 class LaneStops:
     """Stops of the joints, which are the last n coordinates, in lanes of a batch.
 
@@ -80,8 +75,10 @@ class LaneStops:
         self._lower, self._upper, self._impacts = lower, upper, impacts
 
     @classmethod
-    def of(cls, step: LoopStep) -> LaneStops | None:
+    def of(cls, step: LoopStep) -> LaneStops | BallLaneStops | None:
         """Make the stops of a batch; None for a robot without limits."""
+        if step.model.ball_joints:
+            return BallLaneStops(step.model, step) if np.isfinite(joint_ranges(step.model)).any() else None
         lower, upper = stop_positions(step.model)
         return cls(lower, upper, step) if np.isfinite([lower, upper]).any() else None
 
@@ -137,23 +134,92 @@ class LaneStops:
             rows, struck = rows[wrong], np.where(pulled, 0.0, struck)[wrong]
 
 
-def _impact_kernel(step: LoopStep) -> Kernel:
-    """Compile the velocities after impacts, and the impulses along the outward signs."""
+class BallLaneStops:
+    """Stops of a robot with ball joints in lanes of a batch, one lane after the other (`JointStops`).
+
+    The kernel of the mass matrix is compiled when a lane first needs it, or where the stops are pickled.
+    """
+
+    def __init__(self, model: Model, inertia: LoopStep | Kernel) -> None:
+        """`inertia` is the kernel of the mass matrix with armature, or the step it is of."""
+        self._model, self._inertia = model, inertia
+        self._known: Mapping[str, Floats] = {}
+        self._stops = JointStops(model, self._mass_matrix)
+
+    @cached_property
+    def _kernel(self) -> Kernel:
+        return self._inertia if isinstance(self._inertia, Kernel) else _inertia_kernel(self._inertia)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return BallLaneStops, (self._model, self._kernel)
+
+    def __call__(
+        self,
+        rows: Rows,
+        before: Mapping[str, Floats],
+        now: Mapping[str, Floats],
+        fixed: Mapping[str, Floats],
+        reference: Floats,
+    ) -> None:
+        """Do as `LaneStops.__call__`."""
+        for row in rows.tolist():
+            self._known = {name: array[row] for name, array in fixed.items()}
+            stopped = self._stops(before["q"][row], now["q"][row].copy(), now["v"][row].copy())
+            if stopped is None:
+                continue
+            now["q"][row], now["v"][row] = stopped
+            error = np.abs(self._model.difference(now["q"][row], reference))
+            now["max_error"][row] = np.maximum(before["max_error"][row], error)
+            now["squared_errors"][row] = before["squared_errors"][row] + error * error
+
+    def _mass_matrix(self, q: Floats) -> Floats:
+        kernel, nv, lanes = self._kernel, self._model.nv, self._kernel.image.lanes
+        known = {"q": q, **self._known}
+        inputs = [np.tile(known[port.name], (lanes, 1)) for port in kernel.inputs]
+        M = np.empty((lanes, nv * nv))
+        kernel(inputs, [M])
+        return np.asarray(M[0].reshape(nv, nv))
+
+
+def _inertia_kernel(step: LoopStep) -> Kernel:
+    """Compile the mass matrix with armature."""
+    inertia, sizes = _inertia(step)
+    return compiled(
+        StepText(
+            lambda **given: {"M": inertia(given)},
+            {"q": step.model.nq, **sizes},
+            "impacts cannot be compiled",
+            step.key("inertia"),
+        )
+    )
+
+
+def _inertia(step: LoopStep) -> tuple[Callable[[Mapping[str, Array]], Array], dict[str, int]]:
+    """Return the mass matrix with armature as a function of the inputs of a kernel, and the sizes of those
+    besides q."""
     mechanism, disturbances = simplify_mechanism(step.model.mechanism), step.disturbances
-    law = FrictionLaw.of(step.model, np.zeros(step.model.nv))
-    sizes = {"q": step.model.nq, "v": step.model.nv, "struck": step.model.nv}
-    if step.plant is not None:
-        sizes["parameters"] = len(step.plant.parameters.names)
+    sizes = {} if step.plant is None else {"parameters": len(step.plant.parameters.names)}
     if "joint_armature" in disturbances.varied:
         sizes["joint_armature"] = disturbances.varied["joint_armature"]
 
-    def impact(**given: Array) -> dict[str, Array]:
+    def inertia(given: Mapping[str, Array]) -> Array:
         if step.plant is None:
             M = evaluate_quantity(mechanism, "mass_matrix", (), given["q"])
         else:
             M = step.plant.inertia(given["parameters"], given["q"])
-        M = M + np.diag(disturbances.armature_of(given))
-        v, pull = velocity_after_impact(law, M, given["v"], given["struck"])
+        return np.asarray(M + np.diag(disturbances.armature_of(given)))
+
+    return inertia, sizes
+
+
+def _impact_kernel(step: LoopStep) -> Kernel:
+    """Compile the velocities after impacts, and the impulses along the outward signs."""
+    law = FrictionLaw.of(step.model, np.zeros(step.model.nv))
+    inertia, of_inertia = _inertia(step)
+    sizes = {"q": step.model.nq, "v": step.model.nv, "struck": step.model.nv, **of_inertia}
+
+    def impact(**given: Array) -> dict[str, Array]:
+        v, pull = velocity_after_impact(law, inertia(given), given["v"], given["struck"])
         return {"v": v, "pull": pull}
 
     return compiled(StepText(impact, sizes, "impacts cannot be compiled", step.key("impact")))

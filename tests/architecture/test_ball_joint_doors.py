@@ -110,9 +110,6 @@ REFUSED: dict[str, Callable[[Path], object]] = {
     "time_optimal_path": lambda folder: trajectory.time_optimal_path(
         [Q, MODEL.neutral()], velocity=1.0, acceleration=1.0, model=MODEL
     ),
-    "simulate_batch with limits": lambda folder: dynx.simulate_batch(
-        MODEL, control.PD(MODEL, kp=1.0, kd=1.0), MODEL.neutral(), rollouts=2, duration=0.1
-    ),
     "agree with PyBullet": lambda folder: raised(dynx.agree(MODEL, ["reference", "pybullet"])),
     "diagnose with Drake": of_file(lambda path: raised(dynx.diagnose(path, engines=["drake"]))),
     "load_as Pinocchio": of_file(loaded),

@@ -329,6 +329,28 @@ def test_batches_equal_single_runs() -> None:
     assert "max_error:wrist.z" in batch.columns()
 
 
+def test_limits_stop_the_lanes_of_a_batch() -> None:
+    """Each rollout is that of `simulate`, compiled or plain, with its own armature."""
+    model = arm(limits=Limits(upper=1.4))
+    q0 = model.random(1)
+    law = control.PD(model, kp=0.0, kd=0.0)
+    v0 = np.random.default_rng(1).uniform(-3.0, 3.0, model.nv)
+    armature = np.array([0.0, 0.05])[:, None] * np.ones(model.nv)
+    options: Any = {"dt": 1e-3, "duration": 0.4, "q0": q0, "v0": v0}
+    batch = dynx.simulate_batch(
+        model, law, q0, rollouts=2, joint_armature=armature, record_every=1, **options
+    )
+    for k in range(2):
+        for plant in ("compiled", "reference"):
+            run = dynx.simulate(model, law, q0, plant=plant, joint_armature=armature[k], **options)
+            angle = limited_positions(model, run.q)[:, 0]
+            assert np.any(np.abs(angle - 1.4) <= 1e-9)
+            assert np.max(angle) <= 1.4 + 1e-12
+            assert np.max(np.abs(batch.q[k] - run.q[-1])) <= 1e-9
+            assert np.max(np.abs(batch.max_error[k] - np.max(np.abs(run.error[1:]), axis=0))) <= 1e-9
+        assert dynx.simulate(model, law, q0, plant="compiled", **options).executor == "compiled"
+
+
 # -- files ----------------------------------------------------------------------------------------
 
 
