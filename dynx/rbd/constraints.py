@@ -23,7 +23,8 @@ Sweeps converge linearly, and slowly where a heavy body rests on a light one.
 F = g (x - projection of x - w / g) in m/s, which are piecewise smooth (Alart and Curnier, A mixed formulation
 for frictional contact problems prone to Newton like solution methods, 1991). Redundant contacts make its
 matrix singular; a small multiple of g on its diagonal, which falls with F (Levenberg and Marquardt), selects
-the impulses closest to the ones before.
+the impulses closest to the ones before, as proximal methods do (Carpentier, Le Lidec and Montaut, From
+compliant to rigid contact simulation: a unified and efficient approach, 2024).
 """
 
 from __future__ import annotations

@@ -7,8 +7,7 @@ on both bodies are opposite.
 
 **Gaps.** A contact whose gap phi may close in the step has the normal velocity w >= -phi / h: bodies touch at
 the end of the step, not beyond. Where they overlap, w >= 0. A displacement without velocity takes back a part
-of each overlap and each error of a constraint (split impulses, as in Catto, Iterative dynamics with
-temporal coherence, 2005), so that errors of positions make no kinetic energy.
+of each overlap, and each error of a constraint, so that errors of positions make no kinetic energy.
 
 **Impacts.** A contact with restitution that closes in the step meets at the fraction s of it, with the
 velocity that the free motion has then. Its coefficient of restitution is reduced to the ratio of this
@@ -208,7 +207,7 @@ class Island:
         if not closes and not self._constraints:
             for part in self.parts.values():
                 part.finish()
-            return [], {}
+            return [TouchImpulse(each, 0.0, np.zeros(3)) for each in self._contacts], {}
         for part in self.parts.values():
             part.release_dry_friction()
         free = self._velocity("free")

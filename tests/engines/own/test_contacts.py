@@ -250,6 +250,16 @@ def test_a_box_and_a_ball_rest_on_a_height_field() -> None:
     assert weight == pytest.approx(3.0 * G, rel=1e-6)
 
 
+def test_bodies_that_touch_without_a_force_have_a_contact() -> None:
+    pair = sphere("a", 0.1, mass=1.0), sphere("b", 0.1, mass=1.0, pose=dynx.Pose((0.2, 0, 0)))
+    with World(Scene("pair", bodies=pair, gravity=(0, 0, 0)), "dynx", 1e-3) as world:
+        for _ in range(2):
+            (contact,) = world.contacts()
+            assert (contact.a, contact.b, contact.normal_force) == ("a", "b", 0.0)
+            assert contact.normal == pytest.approx([-1.0, 0.0, 0.0])
+            world.step()
+
+
 def test_materials_are_those_of_the_scene() -> None:
     with World(tumbling(), "dynx", 1e-3) as world:
         assert not world.inexact_materials()
