@@ -290,7 +290,7 @@ def _engine(comparison: WorldComparison, run: EngineRun) -> EngineEntry:
         "error": "interrupted" if run.interrupted else None if run.error is None else str(run.error),
         "notes": list(run.notes),
         "robots": [
-            entry_of(RobotEntry, last.robots[each.name], name=each.name, joints=each.model.joint_names)
+            entry_of(RobotEntry, last.robots[each.name], name=each.name, joints=each.model.position_names)
             for each in scene.robots
         ],
         "bodies": [

@@ -143,6 +143,7 @@ COMMANDS_THAT_COMPUTE = (
     ("agree", "ROBOT", "--samples", "3"),
     ("sim", "ROBOT", "--duration", "0.1"),
     ("doctor", "ROBOT"),
+    ("world", "ROBOT", "--duration", "0.05", "--engine", "dynx"),
     ("ik", "ROBOT", "--target", "0,0,0.4", "--frame", "hand"),
 )
 COMMANDS_THAT_REFUSE = (
