@@ -35,10 +35,12 @@ from tests.world.random_scenes.examination import (
 )
 from tests.world.random_scenes.rest import balances, rest_excess
 
-EXAMPLES = {"pybullet": 8, "mujoco": 8, "drake": 4}
+ENGINES = (*WORLDS, "dynx")
+
+EXAMPLES = {"pybullet": 8, "mujoco": 8, "drake": 4, "dynx": 8}
 STEPS = 80
 
-RESTING = {"pybullet": range(3), "mujoco": range(3), "drake": range(0)}
+RESTING = {"pybullet": range(3), "mujoco": range(3), "drake": range(0), "dynx": range(0)}
 """Numbers of the random scenes of which the parts at rest are examined."""
 
 TRUNK = """
@@ -65,7 +67,7 @@ LARGEST_DISTANCE = 5e-3
 """Distance [m] after 0.08 s between runs in another order of the parts or at another place."""
 
 
-@pytest.mark.parametrize("engine", WORLDS)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_momentum_and_energy_stay_within_the_bounds_of_the_engine(engine: str) -> None:
     @settings(max_examples=EXAMPLES[engine])
     @given(scenes())
@@ -106,7 +108,7 @@ def test_bullet_gains_energy_in_a_rebound_with_friction() -> None:
     assert cause.setting == "restitution_speed"
 
 
-@pytest.mark.parametrize("engine", WORLDS)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_runs_are_equal_and_depend_little_on_order_and_place(engine: str) -> None:
     @settings(max_examples=EXAMPLES[engine] // 2)
     @given(scenes())
@@ -120,7 +122,7 @@ def test_runs_are_equal_and_depend_little_on_order_and_place(engine: str) -> Non
     check()
 
 
-@pytest.mark.parametrize("engine", WORLDS)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_forces_on_what_has_come_to_rest_balance_weights_and_moments(engine: str) -> None:
     found = [each for number in RESTING[engine] for each in balances(resting_scene_of(number), engine)]
     found += balances(leaning_scene(), engine)

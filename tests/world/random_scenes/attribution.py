@@ -46,6 +46,7 @@ CANDIDATES: Mapping[str, tuple[tuple[str, tuple[Any, ...]], ...]] = {
         ("ccd_iterations", (200, 1000)),
         ("dt", (DT / 4, DT / 8)),
     ),
+    "dynx": (("dt", (DT / 4, DT / 8)),),
     "drake": (
         ("modulus", (1e6, 1e5)),
         ("stiffness", (1e5, 1e4)),

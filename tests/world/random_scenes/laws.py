@@ -27,7 +27,7 @@ from dynx.spatial.scalar import Floats
 from dynx.world import Contact, Scene, World
 from tests.world.random_scenes.mechanics import RigidBodies
 
-RESIDUAL = {"pybullet": 1e-9, "mujoco": 1e-4}
+RESIDUAL = {"pybullet": 1e-9, "mujoco": 1e-4, "dynx": 1e-9}
 """Relative error of impulses: MuJoCo stops its solver at `tolerance`."""
 
 DRAKE_TOLERANCE = 1e-6
@@ -38,9 +38,10 @@ RECOVERY: dict[str, Callable[[World], float]] = {
     "pybullet": lambda world: world.settings["contact_erp"] / world.dt,
     "mujoco": lambda world: world.dt / max(world.settings["time_constant"], 2.0 * world.dt) ** 2,
     "drake": lambda world: 1.0 / world.dt,
+    "dynx": lambda world: 0.0,
 }
 """Speed of separation per penetration [1/s]: Bullet's Baumgarte term; the stiffness of MuJoCo's springs times
-a step; for the springs of Drake, removal in a step."""
+a step; for the springs of Drake, removal in a step; 0 for dynx, which moves bodies apart without velocity."""
 
 SECOND_ORDER = 5.0
 """Factor of terms of second order in the step."""
