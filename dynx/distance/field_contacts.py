@@ -53,9 +53,12 @@ def field_candidates(a: PlacedSolid, ground: PlacedSolid, within: float) -> list
     columns = [rotate_back(ground.rows, axis) for axis in a.axes]
     near.axes = columns[0], columns[1], columns[2]
     near.rows = tuple(zip(*columns, strict=True))  # type: ignore[assignment]
+    box = _box(near, core, within)
+    if box[1][2] < terrain.bottom:
+        return []
     found = [
-        *_on_triangles(near, core, terrain, within),
-        *_on_ridges(near, core, terrain, within),
+        *_on_triangles(near, core, terrain, within, box),
+        *_on_ridges(near, core, terrain, within, box),
     ]
     return [_in_world(each, ground) for each in found]
 
@@ -83,11 +86,11 @@ def _box(a: PlacedSolid, core: Core, within: float) -> tuple[Floats, Floats]:
 
 
 def _on_triangles(
-    a: PlacedSolid, core: Core, terrain: Terrain, within: float
+    a: PlacedSolid, core: Core, terrain: Terrain, within: float, box: tuple[Floats, Floats]
 ) -> Iterator[NormalAndCandidate]:
     """Yield the candidates along the normals of triangles."""
     size = core.extent + core.radius
-    lower, upper = _box(a, core, within)
+    lower, upper = box
     rows, columns = terrain.cells(lower, upper)
     for row in rows:
         for column in columns:
@@ -138,10 +141,12 @@ def _on_triangle(
         )
 
 
-def _on_ridges(a: PlacedSolid, core: Core, terrain: Terrain, within: float) -> Iterator[NormalAndCandidate]:
+def _on_ridges(
+    a: PlacedSolid, core: Core, terrain: Terrain, within: float, box: tuple[Floats, Floats]
+) -> Iterator[NormalAndCandidate]:
     """Yield the candidates on ridges and summits, along normals of their cones."""
     size = core.extent + core.radius
-    lower, upper = _box(a, core, within)
+    lower, upper = box
     rows, columns = terrain.cells(lower, upper)
     for first, second, beside in _edges(terrain, rows, columns):
         p, q = terrain.vertex(*first), terrain.vertex(*second)

@@ -20,6 +20,8 @@ class Terrain:
         rows, columns = self.heights.shape
         self.rows, self.columns = int(rows), int(columns)
         self.width, self.depth = shape.size
+        self.bottom = float(self.heights.min()) - shape.DEPTH
+        """Height of the lower side of the ground."""
         self.dx, self.dy = self.width / (self.columns - 1), self.depth / (self.rows - 1)
 
     def vertex(self, row: int, column: int) -> Vector3:
