@@ -14,7 +14,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import BackendError, RobotNotFoundError, UnknownBackendError, shown
 from dynx.loaded.robot import LoadedRobot
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
+from dynx.model.ball_joints import BACKENDS_WITH_BALL_JOINTS, refuse_ball_joints
 from dynx.registry import ClassRegistry
 
 REGISTRY: ClassRegistry[LoadedRobot] = ClassRegistry(
@@ -79,7 +79,9 @@ def load_as(
         )
     loader = loader_class(engine)
     if model.ball_joints and not loader.takes_ball_joints:
-        refuse_ball_joints(model, f"the comparison of files as {shown(engine)} loads them")
+        what = f"the comparison with {shown(engine)}, which loads the file itself,"
+        instead = f"'mujoco' as it loads the file does, and {BACKENDS_WITH_BALL_JOINTS}"
+        refuse_ball_joints(model, what, instead)
     return loader(file, model, calls)
 
 

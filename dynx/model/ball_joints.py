@@ -5,15 +5,17 @@ from __future__ import annotations
 from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model.tree import Tree
 
+BACKENDS_WITH_BALL_JOINTS = "the backends 'reference', 'compiled', 'pinocchio' and 'mujoco' do"
 
-def refuse_ball_joints(tree: Tree, what: str) -> None:
+
+def refuse_ball_joints(tree: Tree, what: str, instead: str = BACKENDS_WITH_BALL_JOINTS) -> None:
     """Raise UnsupportedFeatureError, which names the joint, if the robot has a ball joint.
 
-    `what` takes none, and says so: "inverse kinematics", "simulate".
+    `what` takes none, and says so: "inverse kinematics", "simulate". `instead` is a clause on what does.
     """
     if tree.ball_joints:
         joint = tree.ball_joints[0]
-        raise UnsupportedFeatureError(_refusal(tree, what), source=_source(tree), line=joint.line)
+        raise UnsupportedFeatureError(_refusal(tree, what, instead), source=_source(tree), line=joint.line)
 
 
 def refuse_ball_joints_of_backend(tree: Tree, backend: str) -> None:
@@ -22,12 +24,9 @@ def refuse_ball_joints_of_backend(tree: Tree, backend: str) -> None:
         raise EngineLimitError(_refusal(tree, f"the backend {shown(backend)}"))
 
 
-def _refusal(tree: Tree, what: str) -> str:
+def _refusal(tree: Tree, what: str, instead: str = BACKENDS_WITH_BALL_JOINTS) -> str:
     joint = tree.ball_joints[0].name
-    return (
-        f"{shown(joint)} of {tree.name} is a ball joint, which {what} does not take; the backends "
-        "'reference', 'compiled', 'pinocchio' and 'mujoco' do"
-    )
+    return f"{shown(joint)} of {tree.name} is a ball joint, which {what} does not take; {instead}"
 
 
 def _source(tree: Tree) -> str | None:

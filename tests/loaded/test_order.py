@@ -285,3 +285,12 @@ def test_what_has_no_order_is_refused(tmp_path: Path) -> None:
 def test_an_engine_that_does_not_say_is_named() -> None:
     with pytest.raises(dynx.errors.BackendError, match="does not say in which order"):
         LoadedRobot.coordinates(type("Other", (), {"name": "other"})())
+
+
+def test_a_refusal_of_ball_joints_says_what_takes_them(tmp_path: Path) -> None:
+    path = tmp_path / "ball.xml"
+    body = '<body name="b"><joint name="ball" type="ball"/><geom size="0.1" pos="1 0 0"/></body>'
+    path.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    pytest.importorskip("pinocchio")
+    with pytest.raises(UnsupportedFeatureError, match="'mujoco' as it loads the file does"):
+        dynx.load(path).order_of("pinocchio")
