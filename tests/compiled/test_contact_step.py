@@ -175,6 +175,33 @@ def test_standing_on_a_plane_and_on_a_slope() -> None:
     assert np.abs(state[1]).max() < 1e-9
 
 
+def test_a_box_slides_in_any_direction_and_stops() -> None:
+    """Coulomb's law: the deceleration is mu g, the way v^2 / (2 mu g) - v h / 2; then the box rests."""
+    mu, directions = 0.5, np.arange(8) * np.pi / 4.0
+    inertia = "<inertia ixx='0.04' iyy='0.05' izz='0.08' ixy='0.001' ixz='0' iyz='0'/>"
+    parts = [f"<link name='box'><inertial><mass value='3'/>{inertia}</inertial></link>"]
+    for number, (x, y) in enumerate(((0.2, 0.2), (0.2, -0.2), (-0.2, 0.2), (-0.2, -0.2))):
+        ends = f"<parent link='box'/><child link='c{number}'/><origin xyz='{x} {y} -0.05'/>"
+        parts.append(f"<link name='c{number}'/><joint name='j{number}' type='fixed'>{ends}</joint>")
+    model = dynx.load(f"<robot name='box'>{''.join(parts)}</robot>", base="floating")
+    corners = {f"c{number}": 0.01 for number in range(4)}
+    kernel = compiled(contact_step_text(model, corners, h=H, kp=0.0, kd=0.0, friction=mu))
+    start = np.tile(model.neutral(), (8, 1))
+    start[:, 2] = 0.06
+    v = np.zeros((8, 6))
+    v[:, 0], v[:, 1] = np.cos(directions), np.sin(directions)
+    state = [start, v, np.zeros((8, 12))]
+    for step in range(300):
+        *state, residual = steps(kernel, state[0], state[1], np.zeros((8, 0)), state[2])
+        assert residual.max() <= 1e-6
+        if step == 99:
+            slower = 1.0 - np.linalg.norm(state[1][:, :2], axis=1)
+            np.testing.assert_allclose(slower / (100 * H), mu * 9.81, rtol=1e-12)
+    way = np.linalg.norm(state[0][:, :2] - start[:, :2], axis=1)
+    np.testing.assert_allclose(way, 1.0 / (2.0 * mu * 9.81) - 0.5 * H, rtol=1e-5)
+    assert np.abs(state[1]).max() < 1e-12
+
+
 def test_a_fixed_base_and_prismatic_joints() -> None:
     """A ball on a vertical slide without a motor falls, lands, and bears its weight."""
     inertia = "<inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>"
