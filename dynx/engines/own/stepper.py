@@ -28,6 +28,7 @@ from dynx.steppers.forces import NO_FORCES, Forces
 from dynx.steppers.integrators import METHODS
 from dynx.steppers.joint_stops import MOVES_NO_FURTHER
 from dynx.steppers.layout import WORLD, Layout, Owner, RobotLayout
+from dynx.steppers.materials import STRICT_MATERIALS
 from dynx.steppers.robot_step import SCHEMES
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
@@ -65,6 +66,7 @@ class OwnStepper(Stepper):
         "atol": Setting(
             1e-12, "absolute tolerance of the integrator `adaptive`", least=1e-300, needs=_ADAPTIVE
         ),
+        "strict_materials": STRICT_MATERIALS,
     }
     takes_ball_joints: ClassVar[bool] = True
     contact_law: ClassVar[str] = (
@@ -85,12 +87,12 @@ class OwnStepper(Stepper):
             for k, body in enumerate(layout.bodies):
                 if not body.fixed:
                     self._bodies[k] = OwnBody(body, layout.gravity, dt, settings)
-            self._islands_of_constraints(settings)
+            self._prepare_islands(settings)
         except BaseException:
             self.close()
             raise
 
-    def _islands_of_constraints(self, settings: Mapping[str, Any]) -> None:
+    def _prepare_islands(self, settings: Mapping[str, Any]) -> None:
         """Prepare what touches and what is constrained.
 
         Raises UnsupportedFeatureError for another integrator than semi-implicit Euler.
