@@ -11,7 +11,7 @@ velocities after the impact for the lanes in which such a joint moves outwards, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -143,8 +143,7 @@ class BallLaneStops:
     def __init__(self, model: Model, inertia: LoopStep | Kernel) -> None:
         """`inertia` is the kernel of the mass matrix with armature, or the step it is of."""
         self._model, self._inertia = model, inertia
-        self._known: Mapping[str, Floats] = {}
-        self._stops = JointStops(model, self._mass_matrix)
+        self._stops = JointStops(model, partial(self._mass_matrix, {}))
 
     @cached_property
     def _kernel(self) -> Kernel:
@@ -163,8 +162,10 @@ class BallLaneStops:
     ) -> None:
         """Do as `LaneStops.__call__`."""
         for row in rows.tolist():
-            self._known = {name: array[row] for name, array in fixed.items()}
-            stopped = self._stops(before["q"][row], now["q"][row].copy(), now["v"][row].copy())
+            # Parts of a batch share these stops, and run in several threads.
+            known = {name: array[row] for name, array in fixed.items()}
+            stops = self._stops.with_mass_matrix(partial(self._mass_matrix, known))
+            stopped = stops(before["q"][row], now["q"][row].copy(), now["v"][row].copy())
             if stopped is None:
                 continue
             now["q"][row], now["v"][row] = stopped
@@ -172,10 +173,10 @@ class BallLaneStops:
             now["max_error"][row] = np.maximum(before["max_error"][row], error)
             now["squared_errors"][row] = before["squared_errors"][row] + error * error
 
-    def _mass_matrix(self, q: Floats) -> Floats:
+    def _mass_matrix(self, known: Mapping[str, Floats], q: Floats) -> Floats:
         kernel, nv, lanes = self._kernel, self._model.nv, self._kernel.image.lanes
-        known = {"q": q, **self._known}
-        inputs = [np.tile(known[port.name], (lanes, 1)) for port in kernel.inputs]
+        numbers = {**known, "q": q}
+        inputs = [np.tile(numbers[port.name], (lanes, 1)) for port in kernel.inputs]
         M = np.empty((lanes, nv * nv))
         kernel(inputs, [M])
         return np.asarray(M[0].reshape(nv, nv))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from copy import copy
 from operator import le
 from typing import TYPE_CHECKING
 
@@ -46,6 +47,12 @@ class JointStops:
         self._unit_impulses: Floats = np.eye(model.nv)
         self._mass_matrix = mass_matrix
         self._balls = _BallStops(model) if model.ball_joints else None
+
+    def with_mass_matrix(self, mass_matrix: Callable[[Floats], Floats]) -> JointStops:
+        """Return the stops of the same joints in a robot with another mass matrix."""
+        twin = copy(self)
+        twin._mass_matrix = mass_matrix
+        return twin
 
     def __call__(self, before: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats] | None:
         """Return the state after the impacts of a step from the configuration `before` (nq,) to q, v; None if
