@@ -66,7 +66,7 @@ FLOWS = {
         ("world", "sim", "ik.closed_forms"),
         (),
         105,
-        19010,
+        18900,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -89,7 +89,7 @@ FLOWS = {
         ),
         (),
         152,
-        25430,
+        25500,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
