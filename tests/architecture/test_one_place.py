@@ -19,6 +19,7 @@ IDEAS = {
     "errors of a sensor": r"^class SensorErrors\b",
     "samples of a sensor": r"^def read_sensor\b",
     "external force": r"def share\(self, t: float",
+    "impulses of contacts, limits and constraints in one step": r"^class ConstraintSets\b",
     "joint friction": r"^class FrictionLaw\b",
     "a step of a robot by a backend": r"^class RobotStep\b",
     "parameters in which the robots of a batch differ": r"^class Parameters\b|^def plant_model\b",
