@@ -92,23 +92,22 @@ def _on_triangles(
     size = core.extent + core.radius
     lower, upper = box
     rows, columns = terrain.cells(lower, upper)
-    for row in rows:
-        for column in columns:
-            square = terrain.heights[row : row + 2, column : column + 2]
-            if square.max() < lower[2]:
-                continue
-            corners = [(row, column), (row, column + 1), (row + 1, column + 1), (row + 1, column)]
-            for half in (0, 1):
-                vertices = [corners[0], *corners[1 + half : 3 + half]]
-                points = [terrain.vertex(*each) for each in vertices]
-                normal = _unit(cross(minus(points[1], points[0]), minus(points[2], points[0])))
-                core.place(a.R, a.p)
-                down = -normal[0], -normal[1], -normal[2]
-                lowest = minus(core.support(down), points[0])
-                if dot(lowest, normal) - core.radius > within:
-                    continue
-                numbers = [terrain.number(*each) for each in vertices]
-                yield from _on_triangle(a, points, numbers, normal, terrain, within, size)
+    if not rows or not columns:
+        return
+    tops, normals = terrain.triangles(rows, columns)
+    core.place(a.R, a.p)
+    heights = np.einsum("ij,ij->i", core.supports(-normals) - tops, normals) - core.radius
+    for k in np.flatnonzero(heights <= within).tolist():
+        cell, half = divmod(k, 2)
+        row, column = rows[cell // len(columns)], columns[cell % len(columns)]
+        corners = [(row, column), (row, column + 1), (row + 1, column + 1), (row + 1, column)]
+        vertices = [corners[0], *corners[1 + half : 3 + half]]
+        points = [terrain.vertex(*each) for each in vertices]
+        if max(p[2] for p in points) < lower[2]:
+            continue
+        numbers = [terrain.number(*each) for each in vertices]
+        x, y, z = normals[k].tolist()
+        yield from _on_triangle(a, points, numbers, (x, y, z), terrain, within, size)
 
 
 def _on_triangle(
@@ -148,13 +147,20 @@ def _on_ridges(
     size = core.extent + core.radius
     lower, upper = box
     rows, columns = terrain.cells(lower, upper)
+    R = a.R
     for first, second, beside in _edges(terrain, rows, columns):
         p, q = terrain.vertex(*first), terrain.vertex(*second)
         if max(p[2], q[2]) < lower[2] or not _is_ridge(p, q, [terrain.vertex(*each) for each in beside]):
             continue
+        # A quick lower bound of the distance: the separation along one normal of the cone.
+        middle = _middle_of_cone(p, q, terrain, beside)
+        core.place(R, a.p)
+        lowest = dot(middle, core.support((-middle[0], -middle[1], -middle[2]))) - core.radius
+        if lowest - max(dot(middle, p), dot(middle, q)) > within:
+            continue
         edge = HullCore(np.array([p, q]) - a.p)
         T: Floats = np.eye(4)
-        T[:3, :3] = a.R
+        T[:3, :3] = R
         nearest = distance_of_cores(core, T, edge, np.eye(4), within)
         if nearest is None or nearest.distance > within:
             continue
@@ -179,7 +185,7 @@ def _on_ridges(
             yield from found
         elif nearest.distance <= 0.0:
             # The shortest way out of an edge may lead along the surface; the middle of the cone leads up.
-            yield from _along_ridge(a, core, (p, q), numbers, _middle_of_cone(p, q, terrain, beside), within)
+            yield from _along_ridge(a, core, (p, q), numbers, middle, within)
 
 
 def _middle_of_cone(p: Vector3, q: Vector3, terrain: Terrain, beside: list[GridPoint]) -> Vector3:

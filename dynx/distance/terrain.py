@@ -44,6 +44,21 @@ class Terrain:
         first, second = (right - low, across - right) if u >= v else (across - above, above - low)
         return low + u * first + v * second
 
+    def triangles(self, rows: range, columns: range) -> tuple[Floats, Floats]:
+        """Return the first vertices (n, 3) and the upward unit normals (n, 3) of the triangles of some cells,
+        two of each cell, row by row: below the diagonal, and above it."""
+        heights = self.heights[rows[0] : rows[-1] + 2, columns[0] : columns[-1] + 2]
+        low, right, above, across = heights[:-1, :-1], heights[:-1, 1:], heights[1:, :-1], heights[1:, 1:]
+        slopes = np.ones((*low.shape, 2, 3))
+        slopes[..., 0, 0], slopes[..., 0, 1] = (low - right) / self.dx, (right - across) / self.dy
+        slopes[..., 1, 0], slopes[..., 1, 1] = (above - across) / self.dx, (low - above) / self.dy
+        tops = np.empty_like(slopes)
+        tops[..., 0] = (np.arange(columns[0], columns[-1] + 1) * self.dx - 0.5 * self.width)[None, :, None]
+        tops[..., 1] = (np.arange(rows[0], rows[-1] + 1) * self.dy - 0.5 * self.depth)[:, None, None]
+        tops[..., 2] = low[:, :, None]
+        normals = slopes / np.linalg.norm(slopes, axis=-1, keepdims=True)
+        return tops.reshape(-1, 3), normals.reshape(-1, 3)
+
     def around(self, row: int, column: int) -> list[Vector3]:
         """Return the vertices that edges connect with a vertex."""
         return [
