@@ -245,6 +245,10 @@ def _root(x: Any) -> Any:
 TOLERANCE = 1e-12
 """Largest residual [m/s or rad/s] at which impulses on floats count as solved."""
 
+SUFFICIENT = 1e-10
+"""Largest residual [m/s or rad/s] after an attempt that ends the search, if `tolerance` is smaller. Redundant
+contacts may leave a little more than `TOLERANCE`, and further attempts do not improve it."""
+
 ROUNDING = 16.0 * FLOAT64_EPS
 """Residual relative to the largest sum of |G| |x| that is rounding."""
 
@@ -319,7 +323,7 @@ def solve(
                 break
             x = x + step
         taken += attempt.sweeps + count
-        if least <= max(tolerance, float((rounding @ np.abs(best)).max(initial=0.0))):
+        if least <= max(tolerance, SUFFICIENT, float((rounding @ np.abs(best)).max(initial=0.0))):
             break
     w = c + G @ best
     return Solution(best, w, residuals(sets, numbers, limits, floors, best, w), taken)
