@@ -133,9 +133,9 @@ PINOCCHIO = {
     "computeABADerivatives": "dynx.Derivatives",
     "computeAllTerms": "the methods of Backend, such as Backend.mass_matrix(q) and Backend.bias_torque(q, v)",
     "computeForwardKinematicsDerivatives": (
-        "dynx.Derivatives.forward_kinematics_derivative(q, frame) for poses with respect to q; "
-        "Backend.jacobian(q, frame) for velocities with respect to v; no call for velocities and "
-        "accelerations with respect to q"
+        "dynx.Derivatives.forward_kinematics_derivative(q, frame) for the derivative of a pose by q. "
+        "Backend.jacobian(q, frame) for the derivative of a velocity by v. dynx has no call for the "
+        "derivatives of velocities and accelerations by q"
     ),
     "computeFrameJacobian": f"Backend.jacobian(q, frame, reference='local') {_LOCAL}, the default of "
     "Pinocchio",

@@ -28,10 +28,10 @@ BLOCK = 45
 
 
 class Row(NamedTuple):
-    """One pair: its case, the gap of the certificate, and the errors of every engine."""
+    """One pair: its case, the difference of the bounds, and the errors of every engine."""
 
     case: tuple[str, str, str]
-    gap: float
+    difference: float
     """Gap of the bounds, relative to the distance where separated, otherwise in metres."""
     seconds: float
     """Time of the certified distance [s]."""
@@ -67,8 +67,8 @@ def measure(measures: Mapping[str, Measure], rng: np.random.Generator, case: tup
     exact = distance(*a, *b)
     seconds = time.process_time() - began
     errors = {name: errors_of(run, a, b, exact) for name, run in measures.items()}
-    gap = exact.gap / exact.distance if case[2] == "separated" else exact.gap
-    return Row(case, gap, seconds, errors)
+    difference = exact.max_error / exact.distance if case[2] == "separated" else exact.max_error
+    return Row(case, difference, seconds, errors)
 
 
 def errors_of(run: Measure, a: Placed, b: Placed, exact: Distance) -> tuple[float, float]:
@@ -89,12 +89,12 @@ def table(rows: Sequence[Row], engines: Sequence[str]) -> Iterator[str]:
     for place in PLACEMENTS:
         yield f"\n**{place.capitalize()}**\n"
         header = [cell for name in engines for cell in (name, CHANGES.get(name)) if cell]
-        yield "| pair | gap | " + " | ".join(header) + " |"
+        yield "| pair | bounds | " + " | ".join(header) + " |"
         yield "|---|" + "---|" * (1 + len(header))
         for case, found in by_case.items():
             if case[2] != place:
                 continue
-            cells = [f"{max(row.gap for row in found):.0e}"]
+            cells = [f"{max(row.difference for row in found):.0e}"]
             for name in engines:
                 errors = np.array([row.errors[name] for row in found])
                 columns = errors.T if name in CHANGES else errors.T[:1]

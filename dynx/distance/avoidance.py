@@ -152,7 +152,10 @@ def _between_links(margin: float, neutral: float, distances: Sequence[float]) ->
     if neutral > 0.0:
         return neutral - ROUNDING, f"{neutral:.3g} m apart at the neutral configuration: their margin"
     if close < ALWAYS * SAMPLES:
-        return neutral - ROUNDING, f"overlap by {-neutral:.3g} m at the neutral configuration, and may do so"
+        return (
+            neutral - ROUNDING,
+            f"overlap by {-neutral:.3g} m at the neutral configuration, which is allowed",
+        )
     return None, f"overlap in {close} of {SAMPLES} configurations: not kept apart"
 
 

@@ -49,8 +49,8 @@ class Distance:
         return self.upper if self.upper > 0.0 else self.lower
 
     @property
-    def gap(self) -> float:
-        """Difference of the bounds [m], at least 0: the largest error of the distance."""
+    def max_error(self) -> float:
+        """Difference of the bounds [m], at least 0: the largest possible error of the distance."""
         return max(0.0, self.upper - self.lower)
 
     def swapped(self) -> Distance:

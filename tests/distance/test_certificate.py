@@ -25,7 +25,7 @@ def test_bounds_are_attained(a: ConvexShape, b: ConvexShape, T: Floats) -> None:
     check_certificate(found, a, np.eye(4), b, T)
     relative = 1e-11 if found.lower > 0.0 else 1e-6
     least = 0.0 if found.lower > 0.0 else gap_of_nearly_parallel_axes(a, b, T)
-    assert found.gap <= relative * max(abs(found.distance), 0.1) + least
+    assert found.max_error <= relative * max(abs(found.distance), 0.1) + least
 
 
 def gap_of_nearly_parallel_axes(a: ConvexShape, b: ConvexShape, T: Floats) -> float:
@@ -49,7 +49,7 @@ def check_certificate(found: Distance, a: ConvexShape, T_a: Floats, b: ConvexSha
     check_inside(a, T_a, found.point_a)
     check_inside(b, T_b, found.point_b)
     between = found.point_a - found.point_b
-    assert_allclose(between, found.distance * found.normal, atol=POINTS + 2.0 * found.gap)
+    assert_allclose(between, found.distance * found.normal, atol=POINTS + 2.0 * found.max_error)
     if found.upper > 0.0:
         assert np.linalg.norm(between) == pytest.approx(found.upper, abs=ROUNDING)
 
@@ -85,10 +85,10 @@ def test_distances_are_symmetric_and_invariant(
     here = distance(a, np.eye(4), b, T)
     back = distance(b, T, a, np.eye(4))
     there = distance(a, T_world, b, T_world @ T)
-    tolerance = 1e-12 + here.gap
+    tolerance = 1e-12 + here.max_error
     for other in (back, there):
-        assert other.lower == pytest.approx(here.lower, abs=tolerance + other.gap)
-        assert other.upper == pytest.approx(here.upper, abs=tolerance + other.gap)
+        assert other.lower == pytest.approx(here.lower, abs=tolerance + other.max_error)
+        assert other.upper == pytest.approx(here.upper, abs=tolerance + other.max_error)
 
 
 @settings(max_examples=40)
@@ -128,7 +128,7 @@ def test_sizes_may_differ_by_a_million(first: str, second: str) -> None:
             found = distance(a, T_a, b, T_b)
             check_certificate(found, a, T_a, b, T_b)
             if found.lower > 0.0:
-                assert found.gap <= 1e-9 * found.upper
+                assert found.max_error <= 1e-9 * found.upper
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -158,7 +158,7 @@ def test_nearly_parallel_faces(a: ConvexShape, b: ConvexShape, tilt: float, heig
     check_certificate(found, b, T, a, np.eye(4))
     lowest = height - 0.1 - 0.2 * np.cos(tilt) - 0.3 * np.sin(tilt)
     assert found.lower == pytest.approx(lowest, abs=1e-9 + 0.3 * tilt * (lowest < 0.0))
-    assert found.gap <= 1e-11
+    assert found.max_error <= 1e-11
 
 
 @pytest.mark.parametrize("tilt", [1e-15, 1e-12, 1e-9, 1e-6, 1e-5])
@@ -171,7 +171,7 @@ def test_cylinders_on_nearly_one_axis(other: Cylinder | Capsule, tilt: float) ->
     found = distance(a, np.eye(4), other, T)
     check_certificate(found, a, np.eye(4), other, T)
     assert found.distance == pytest.approx(-0.3 - other.radius, abs=tilt + 1e-12)
-    assert found.gap <= tilt + 1e-12
+    assert found.max_error <= tilt + 1e-12
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -183,7 +183,7 @@ def test_equal_shapes_at_equal_poses(kind: str) -> None:
     # The widths of a shape along any direction are at least its depth in itself.
     for direction in np.random.default_rng(6).normal(size=(100, 3)):
         assert -separation(shape, np.eye(4), shape, np.eye(4), direction) >= -found.upper - ROUNDING
-    assert found.gap <= 1e-9
+    assert found.max_error <= 1e-9
 
 
 @settings(max_examples=40)
@@ -194,5 +194,5 @@ def test_shapes_that_touch(a: ConvexShape, b: ConvexShape, T: Floats) -> None:
     moved[:3, 3] = -start.lower * start.normal
     found = distance(a, moved, b, T)
     check_certificate(found, a, moved, b, T)
-    assert abs(found.lower) <= 1e-12 + start.gap
-    assert abs(found.upper) <= 1e-12 + start.gap + found.gap
+    assert abs(found.lower) <= 1e-12 + start.max_error
+    assert abs(found.upper) <= 1e-12 + start.max_error + found.max_error

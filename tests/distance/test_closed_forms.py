@@ -25,7 +25,7 @@ def test_balls(shape: ConvexShape, T: Floats, radius: float, T_ball: Floats) -> 
     found = distance(Sphere(radius), T_ball, shape, T)
     exact = point_distance(shape, T, T_ball[:3, 3]) - radius
     assert found.distance == pytest.approx(exact, abs=1e-12)
-    assert found.gap <= 1e-11
+    assert found.max_error <= 1e-11
 
 
 @settings(max_examples=40)
@@ -60,7 +60,7 @@ def test_boxes_that_overlap(a: Box, b: Box, T: Floats) -> None:
         # Axes of nearly parallel edges are left out above.
         assert found.lower >= best - 1e-12
         assert found.lower == pytest.approx(best, abs=1e-6)
-        assert found.gap <= 1e-12
+        assert found.max_error <= 1e-12
 
 
 def test_coaxial_and_crossed_cylinders() -> None:
@@ -83,7 +83,7 @@ def test_cylinders_rim_to_rim() -> None:
     T[:3, 3] = [2.0, 0.0, 1.5]
     found = distance(Cylinder(0.5, 0.2), np.eye(4), Cylinder(0.5, 0.2), T)
     assert found.lower == pytest.approx(np.hypot(1.9 - 0.5, 1.0 - 0.1), abs=1e-12)
-    assert found.gap <= 1e-12
+    assert found.max_error <= 1e-12
 
 
 def test_a_mesh_is_its_hull(tmp_path: object) -> None:
@@ -114,5 +114,5 @@ def test_a_mesh_is_its_hull(tmp_path: object) -> None:
 def test_shapes_at_one_place(a: ConvexShape, b: ConvexShape, exact: float) -> None:
     found = distance(a, np.eye(4), b, np.eye(4))
     assert found.distance == pytest.approx(exact, abs=1e-12)
-    assert found.gap <= 1e-12
+    assert found.max_error <= 1e-12
     assert np.linalg.norm(found.point_a - found.point_b) == pytest.approx(-exact, abs=1e-12)

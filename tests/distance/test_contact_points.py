@@ -262,7 +262,9 @@ def test_exchanged_shapes_and_a_rigid_motion(
     exact = distance(a, T_a, b, T_b)
     if exact.lower <= 1e-6:
         # The direction between shapes that overlap may be one of several.
-        assert min(p.gap for p in there) == pytest.approx(min(p.gap for p in here), abs=1e-6 + exact.gap)
+        assert min(p.gap for p in there) == pytest.approx(
+            min(p.gap for p in here), abs=1e-6 + exact.max_error
+        )
         return
     assert there[0].gap == pytest.approx(here[0].gap, abs=1e-6)
     assert_allclose(there[0].normal, T_world[:3, :3] @ here[0].normal, atol=1e-5)
@@ -284,7 +286,7 @@ def test_a_small_motion_moves_points_little(
     after = {each.feature: each for each in found(a, moved, b, T_b, 0.02)}
     least = min(each.gap for each in before.values()), min(each.gap for each in after.values())
     size = size_of(a, b)
-    assert least[1] == pytest.approx(least[0], abs=4.0 * step * size + 4.0 * TIE * size + exact.gap)
+    assert least[1] == pytest.approx(least[0], abs=4.0 * step * size + 4.0 * TIE * size + exact.max_error)
     if exact.lower < 1e-5:
         return
     # The normal turns by the motion over the distance; points move by that times their size, and crossings

@@ -23,7 +23,7 @@ def test_a_ball_is_a_point_with_a_radius(shape: Ellipsoid, T: Floats, radius: fl
     found = distance(Sphere(radius), T_ball, shape, T)
     exact = point_distance(shape, T, T_ball[:3, 3]) - radius
     assert found.distance == pytest.approx(exact, abs=1e-12)
-    assert found.gap <= 1e-11
+    assert found.max_error <= 1e-11
     check_certificate(found, Sphere(radius), T_ball, shape, T)
 
 
@@ -50,10 +50,10 @@ def test_bounds_hold(a: Ellipsoid, b: ConvexShape, T: Floats) -> None:
     assert separation(a, np.eye(4), b, T, found.normal) == pytest.approx(found.lower, abs=1e-13)
     if found.lower > 0.0:
         check_certificate(found, a, np.eye(4), b, T)
-        assert found.gap <= 1e-11 * max(found.distance, 0.1)
+        assert found.max_error <= 1e-11 * max(found.distance, 0.1)
     else:
         # Ellipsoids of revolution about one axis have the same depth all around (docs/distances.md).
-        assert found.gap <= 1e-3 * max(abs(found.distance), 0.1)
+        assert found.max_error <= 1e-3 * max(abs(found.distance), 0.1)
 
 
 @given(ellipsoids, ellipsoids, poses(1.0), st.floats(0.2, 5.0))
@@ -64,7 +64,9 @@ def test_distances_grow_with_the_shapes(a: Ellipsoid, b: Ellipsoid, T: Floats, f
     grown = (Ellipsoid(tuple(factor * x for x in each.radii)) for each in (a, b))  # type: ignore[arg-type]
     first, second = grown
     again = distance(first, np.eye(4), second, larger)
-    assert_allclose(again.distance, factor * found.distance, atol=factor * (1e-9 + found.gap) + again.gap)
+    assert_allclose(
+        again.distance, factor * found.distance, atol=factor * (1e-9 + found.max_error) + again.max_error
+    )
 
 
 def test_two_lenses_on_one_axis_and_a_capsule_through_one() -> None:
