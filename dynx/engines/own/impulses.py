@@ -197,13 +197,15 @@ class Island:
     def step(self, warm: WarmStart) -> tuple[list[TouchImpulse], WarmStart]:
         """Take the step of the parts; return the impulses of the contacts, and those for the next step.
 
-        Where no contact closes and nothing is constrained, each part completes its free motion.
+        Where no contact closes or overlaps and nothing is constrained, each part completes its free motion.
         """
         h, n = self._h, len(self._contacts)
         rows, D = self._contact_rows() if n else (np.zeros((0, 6, self._nv)), np.zeros((0, 3, 3)))
         gaps = np.array([each.gap for each in self._contacts])
         free = self._velocity("free")
         closes = bool((rows[:, 0] @ free < -np.maximum(gaps, 0.0) / h).any())
+        # Overlaps are taken back even where nothing presses the parts together.
+        closes |= bool((gaps < -NEGLIGIBLE).any())
         if not closes and not self._constraints:
             for part in self.parts.values():
                 part.finish()

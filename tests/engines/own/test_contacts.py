@@ -264,3 +264,14 @@ def test_materials_are_those_of_the_scene() -> None:
     with World(tumbling(), "dynx", 1e-3) as world:
         assert not world.inexact_materials()
     assert OwnStepper.name == "dynx"
+
+
+def test_overlaps_are_taken_back_where_nothing_presses_the_parts_together() -> None:
+    balls = (sphere("a", 0.1, mass=1.0), sphere("b", 0.1, mass=3.0, pose=dynx.Pose((0.19, 0, 0))))
+    with World(Scene("afloat", bodies=balls, gravity=(0, 0, 0)), "dynx", dt=1e-2) as world:
+        world.step(100)
+        a, b = (world.state.bodies[name] for name in "ab")
+    # The displacement moves the centre of mass by nothing, and leaves no velocity.
+    assert b.position[0] - a.position[0] == pytest.approx(0.2, abs=1e-9)
+    assert a.position[0] + 3.0 * b.position[0] == pytest.approx(3.0 * 0.19, abs=1e-12)
+    assert np.abs([a.twist, b.twist]).max() == 0.0
