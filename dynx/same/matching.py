@@ -58,6 +58,12 @@ SLACK = 1.0
 MARGIN = 1e-6
 """Share of a limit by which a difference exceeds it for certain, whatever the rounding."""
 
+HALF = 0.5
+"""Cost of a frame in which all bodies fit, but their exchanged inertias do not add up to the root's."""
+
+KEY_DIGITS = 2
+"""Decimals of a pose, beyond those of the tolerance, by which poses have one plan."""
+
 SAME_FRAME = 1e-12
 """Difference of two poses (m, or an entry of the rotation) that are the same frame."""
 
@@ -115,6 +121,8 @@ class Matching:
     def __post_init__(self) -> None:
         self.tolerance = max(self.tolerance, MIN_TOLERANCE)
         self.length = max(self.ours.reach, self.theirs.reach)
+        self._digits = KEY_DIGITS - int(np.floor(np.log10(self.tolerance)))
+        self._per_length = np.array([[1.0, 1.0, 1.0, 1.0 / self.length]] * 3)
         self._axis_frames = [rotation_to_axis(np.eye(3), axis) for axis in self.ours.axes]
 
     def find(self) -> MatchingPlan:
@@ -137,7 +145,11 @@ class Matching:
         bases = [np.eye(4)] if unmoved else self._candidates_of(ROOT, ROOT)
         for number, D in enumerate(bases):
             limit = found[MAX_BASES - 1][0] if len(found) >= MAX_BASES else np.inf
-            found = sorted([*found, (self._followed(ROOT, ROOT, D, limit), number, D)], key=_first_two)
+            count = self._followed(ROOT, ROOT, D, limit)
+            if count == 0.0 and not self._has_same_total(D):
+                # Each body fits but for what may belong to its parent; the root has not got it.
+                count = HALF
+            found = sorted([*found, (count, number, D)], key=_first_two)
             # The frame as it is stays in the choice, and the first in which the base itself fits: below a
             # misplaced joint all differs, in any frame.
             kept = [entry for entry in found[MAX_BASES:] if entry[1] == 0]
@@ -146,7 +158,7 @@ class Matching:
             found = [*found[:MAX_BASES], *kept]
             if found[0][0] == 0.0:
                 break
-        if found[0][0] == 0.0 or found[0][1] == 0:
+        if found[0][0] <= HALF or found[0][1] == 0:
             found = found[:1]
         best = self._chosen(ROOT, ROOT, found[0][2], 0.0)
         # Of bases that explain as much, the one in which more shapes are where they were.
@@ -158,6 +170,12 @@ class Matching:
                 if (plan.rank, other) < (best.rank, shapes):
                     best, shapes = plan, other
         return best
+
+    def _has_same_total(self, D: Floats) -> bool:
+        """Check whether the roots with the frames D have the same inertia with all that may be theirs."""
+        mine, other = self.ours.grouped[ROOT], self.theirs.grouped[ROOT]
+        whole = self.ours.whole
+        return inertia_ratio(subtract(mine, transformed(other, D)), mine, whole) <= self.tolerance
 
     def _misplaced_shapes(self, D: Floats) -> int:
         """Count the shapes of floating bases with the frames D that have no equal."""
@@ -181,7 +199,7 @@ class Matching:
 
     def _followed(self, a: int, b: int, D: Floats, limit: float) -> float:
         """Return how many elements differ if every frame follows from D, or any number from `limit` on."""
-        key = (a, b, np.round(D, 9).tobytes())
+        key = self._key(a, b, D)
         known = self._counts.get(key)
         if known is not None and (known[1] or known[0] >= limit):
             return known[0]
@@ -294,7 +312,7 @@ class Matching:
 
     def _subtree(self, a: int, b: int, D: Floats) -> MatchingPlan:
         """Return the best plan of two bodies with the frames D, and of all below them."""
-        key = (a, b, np.round(D, 9).tobytes())
+        key = self._key(a, b, D)
         plan = self._plans.get(key)
         if plan is None:
             plan = self._plans[key] = self._evaluated(a, b, D)
@@ -401,11 +419,15 @@ class Matching:
         """Return the cosine of the angle between the axes of two bodies."""
         return float(D[:3, :3] @ self.theirs.axes[b] @ self.ours.axes[a])
 
+    def _key(self, a: int, b: int, D: Floats) -> Key:
+        """Return what names two bodies with the frames D; frames of one name differ by less than counts."""
+        return a, b, np.round(D[:3] * self._per_length, self._digits).tobytes()
+
     # -- elements ---------------------------------------------------------------------------------
 
     def _own_cost(self, a: int, b: int, D: Floats) -> float:
         """Return how many elements must be replaced for the axes and inertias of two bodies to coincide."""
-        key = (a, b, np.round(D, 9).tobytes())
+        key = self._key(a, b, D)
         cost = self._own_costs.get(key)
         if cost is None:
             cost = 0.0 if a == ROOT else self._axis_cost(a, b, D)

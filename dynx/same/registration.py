@@ -13,6 +13,7 @@ from itertools import combinations, islice, product
 import numpy as np
 
 from dynx.model.mechanism import ROOT
+from dynx.same.arrangement import arrangements
 from dynx.same.decimals import rounded
 from dynx.same.skeleton import Skeleton
 from dynx.spatial.inertia import RigidInertia
@@ -40,6 +41,8 @@ MAX_DEPTH = 4
 def candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int, depth: int = 0) -> Iterator[Floats]:
     """Yield poses (4, 4) that the frame of body b of `theirs` may have in the frame of body a of `ours`."""
     yield from _own_candidates(ours, theirs, a, b)
+    if a == b == ROOT:
+        yield from arrangements(ours, theirs, _counterparts(ours, theirs))
     if depth >= MAX_DEPTH or (a != ROOT and depth == 0):
         # Only the frame of a floating root follows from no other.
         return
@@ -61,6 +64,19 @@ def _children(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> list[tuple[in
     return pairs[:MAX_LINES]
 
 
+def _counterparts(ours: Skeleton, theirs: Skeleton) -> list[tuple[int, int]]:
+    """Return the bodies of both robots that may be counterparts, each once, parents first."""
+    found = {ROOT: ROOT}
+    waiting = [(ROOT, ROOT)]
+    while waiting:
+        a, b = waiting.pop(0)
+        for i, j in _children(ours, theirs, a, b):
+            if i not in found and j not in found.values():
+                found[i] = j
+                waiting.append((i, j))
+    return list(found.items())
+
+
 def _own_candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterator[Floats]:
     yield np.eye(4)
     named = {ours.model.links[k].name: k for k in ours.links[a]}
@@ -71,7 +87,7 @@ def _own_candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterato
     pairs = [(ours.inertias[a], theirs.inertias[b])]
     if a == b == ROOT:
         # The centre of mass moves where a part of the inertia is stated in another body.
-        pairs.append((ours.grouped_root, theirs.grouped_root))
+        pairs.append((ours.grouped[ROOT], theirs.grouped[ROOT]))
     for first, second in pairs:
         frames = zip(_frames(ours, a, first), _frames(theirs, b, second), strict=False)
         for mine_frames, their_frames in frames:

@@ -134,12 +134,13 @@ class Skeleton:
         return found
 
     @cached_property
-    def grouped_root(self) -> RigidInertia:
-        """Inertia of the root body in float64, with all of the other bodies that may as well be the parent's.
+    def grouped(self) -> dict[int, RigidInertia]:
+        """Inertias of the bodies in float64, each with all of the bodies below it that may as well be the
+        parent's.
 
         Of a body on a revolute joint that is its mass, its first moment along the axis, and the mean of its
         moments about the axes across; of one on a prismatic joint its tensor about the centre of mass
-        (Gautier and Khalil 1990). An exchange of inertia that no state shows leaves it as it is.
+        (Gautier and Khalil 1990). An exchange of inertia that no state shows leaves that of the root alone.
         """
         total = dict(self.inertias)
         for number in reversed(range(len(self.bodies))):
@@ -155,7 +156,7 @@ class Skeleton:
                 moved = RigidInertia(np.zeros(()), np.zeros(3), central)
             parent = self.bodies[number].parent
             total[parent] = total[parent] + moved.transform(T[:3, :3], T[:3, 3])
-        return total[ROOT]
+        return total
 
     def link_pose(self, link: int) -> Array:
         """Return the pose (4, 4) of a link, by its number, in the frame of its body, in 50 digits."""

@@ -1,0 +1,165 @@
+"""Rigid transforms that may map a whole floating robot at its zero positions onto another one.
+
+Where no body determines its frame alone, as in a robot of slides and links without mass, the joint axes and
+the centres of mass of all bodies together do. Directions of axes have no sign, slides no place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from dynx.model.mechanism import ROOT
+from dynx.same.skeleton import Skeleton
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import cross, skew
+
+ALONG = 1e-5
+"""Sine of an angle [rad] below which two directions count as parallel, and share of the robot's reach below
+which two places count as one."""
+
+ISOLATED = 1e-4
+"""Relative difference of a principal moment from the others from which on its axis is a direction."""
+
+
+@dataclass
+class _Features:
+    """What is fixed to a robot at its zero positions, in the frame of its root, keyed alike in both robots:
+    joint axes and principal axes, which have no sign, directions with one, and places with what of a shift
+    (3, 3) they determine."""
+
+    axes: dict[object, Floats] = field(default_factory=dict)
+    principal: dict[object, Floats] = field(default_factory=dict)
+    ways: dict[object, Floats] = field(default_factory=dict)
+    places: dict[object, tuple[Floats, Floats]] = field(default_factory=dict)
+
+
+def arrangements(ours: Skeleton, theirs: Skeleton, pairs: list[tuple[int, int]]) -> Iterator[Floats]:
+    """Yield poses (4, 4) of the root frame of `theirs` in that of `ours` from all bodies together.
+
+    `pairs` are the bodies that may be counterparts, parents first. Inertia that may belong to the parent of
+    a joint may be split otherwise in `theirs`; the bodies' own inertias are tried second.
+    """
+    for grouped in (True, False):
+        first = _features(ours, [a for a, _ in pairs], grouped)
+        second = _features(theirs, [b for _, b in pairs], grouped)
+        for R in _rotations(first, second):
+            yield homogeneous(R, _shift(first, second, R))
+
+
+def _features(skeleton: Skeleton, order: list[int], grouped: bool) -> _Features:
+    found, poses = _Features(), _zero_poses(skeleton)
+    inertias: Mapping[int, RigidInertia] = skeleton.grouped if grouped else skeleton.inertias
+    for key, body in enumerate(order):
+        T, inertia = poses[body], inertias[body]
+        turns = body != ROOT and skeleton.bodies[body].revolute
+        if body != ROOT:
+            axis = found.axes[key] = T[:3, :3] @ skeleton.axes[body]
+            if turns:
+                found.places[key, "line"] = T[:3, 3], np.eye(3) - np.outer(axis, axis)
+        mass = float(inertia.mass)
+        if grouped and turns:
+            # The parent may have the mass, and what of the first moment is along the axis.
+            off = T[:3, :3] @ inertia.first_moment
+            _add_way(found, key, off - axis * (axis @ off), skeleton.whole.mass * skeleton.reach)
+        elif mass > 0.0:
+            found.places[key, "centre"] = T[:3, :3] @ (inertia.first_moment / mass) + T[:3, 3], np.eye(3)
+        if body == ROOT or not grouped:
+            for number, axis in _principal_axes(inertia):
+                found.principal[key, number] = T[:3, :3] @ axis
+    _add_offsets(found, skeleton.reach)
+    return found
+
+
+def _principal_axes(inertia: RigidInertia) -> Iterator[tuple[int, Floats]]:
+    """Yield the principal axes (3,) that no other one can be exchanged for, numbered by their moments."""
+    mass, H = float(inertia.mass), skew(inertia.first_moment)
+    moments, axes = np.linalg.eigh(inertia.rotational_inertia + (H @ H / mass if mass else 0.0))
+    scale = float(np.max(np.abs(moments)))
+    for number in range(3):
+        others = np.delete(moments, number)
+        if float(np.min(np.abs(others - moments[number]))) > ISOLATED * scale:
+            yield number, axes[:, number]
+
+
+def _zero_poses(skeleton: Skeleton) -> dict[int, Floats]:
+    poses = {ROOT: np.eye(4)}
+    for number, body in enumerate(skeleton.bodies):
+        poses[number] = poses[body.parent] @ skeleton.placements[number]
+    return poses
+
+
+def _add_offsets(found: _Features, reach: float) -> None:
+    """Add the directions from the first centre of mass, or else the first line, to all other places: only
+    what both places determine of them."""
+    keys = sorted(found.places, key=lambda key: str(key[1]) if isinstance(key, tuple) else "")
+    if not keys:
+        return
+    start, known = found.places[keys[0]]
+    for key in keys[1:]:
+        place, determined = found.places[key]
+        if float(np.max(np.abs(known @ determined - determined @ known))) <= ALONG:
+            _add_way(found, ("offset", key), known @ determined @ (place - start), reach)
+
+
+def _add_way(found: _Features, key: object, way: Floats, scale: float) -> None:
+    length = float(np.linalg.norm(way))
+    if length > ALONG * scale:
+        found.ways[key] = way / length
+
+
+def _rotations(first: _Features, second: _Features) -> Iterator[Floats]:
+    """Yield the rotations that map two directions of the second robot onto those of the first: joint axes are
+    the first, so that they keep their signs if they can."""
+    directions = [
+        (mine[key], other[key], signs)
+        for mine, other, signs in (
+            (first.axes, second.axes, (1.0, -1.0)),
+            (first.ways, second.ways, (1.0,)),
+            (first.principal, second.principal, (1.0, -1.0)),
+        )
+        for key in mine
+        if key in other
+    ]
+    if not directions:
+        yield np.eye(3)
+        return
+    u, x, u_signs = directions[0]
+    sines = [
+        min(float(np.linalg.norm(cross(u, v))), float(np.linalg.norm(cross(x, y)))) for v, y, _ in directions
+    ]
+    best = int(np.argmax(sines))
+    if sines[best] <= ALONG:
+        for sign in u_signs:
+            yield _axes(u, _across(u)) @ _axes(sign * x, _across(x)).T
+        return
+    v, y, v_signs = directions[best]
+    for one, other in product(u_signs, v_signs):
+        yield _axes(u, v) @ _axes(one * x, other * y).T
+
+
+def _across(u: Floats) -> Floats:
+    return np.asarray(np.eye(3)[int(np.argmin(np.abs(u)))])
+
+
+def _axes(u: Floats, v: Floats) -> Floats:
+    """Return the rotation (3, 3) whose first axis is u, and whose third is normal to u and v."""
+    normal = cross(u, v)
+    normal = normal / np.linalg.norm(normal)
+    return np.stack([u, cross(normal, u), normal], axis=1)
+
+
+def _shift(first: _Features, second: _Features, R: Floats) -> Floats:
+    """Return the smallest shift (3,) by which the turned places of the second robot are nearest to those of
+    the first."""
+    rows, wanted = [np.zeros((1, 3))], [np.zeros(1)]
+    for key, (place, determined) in first.places.items():
+        if key in second.places:
+            rows.append(determined)
+            wanted.append(determined @ (place - R @ second.places[key][0]))
+    return np.asarray(np.linalg.lstsq(np.concatenate(rows), np.concatenate(wanted), rcond=ALONG)[0])
