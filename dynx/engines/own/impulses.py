@@ -123,6 +123,8 @@ class Island:
         self._nv = first
         self.residual = 0.0
         """Largest residual of the impulses [m/s or rad/s]."""
+        self.displacement_residual = 0.0
+        """Largest residual of the displacement that takes back overlaps, over the step [m/s or rad/s]."""
 
     # -- rows ---------------------------------------------------------------------------------
 
@@ -246,7 +248,10 @@ class Island:
         u = free + X @ first.impulses
         w = u if last is first else free + X @ last.impulses
         correction = self._correction(sets, G, first.velocities - opening, gaps, limit_gaps, errors, normals)
-        displaced = u if correction is None else u + X @ correction
+        displaced = u
+        if correction is not None:
+            self.displacement_residual = float(correction.residuals.largest)
+            displaced = u + X @ correction.impulses
         for number, part in self.parts.items():
             columns = self._columns[number]
             part.finish_at(displaced[columns], self._at_rest(number, w[columns], dry, sets, last, numbers))
@@ -293,8 +298,8 @@ class Island:
         limit_gaps: Floats,
         errors: Floats,
         normals: NDArray[np.intp],
-    ) -> Floats | None:
-        """Return the impulses (m,) of the displacement that takes back a part of overlaps and errors of
+    ) -> Solution | None:
+        """Return the impulses of the displacement that takes back a part of overlaps and errors of
         constraints; None where there are none."""
         h = self._h
         overlaps = bool((gaps < -NEGLIGIBLE).any())
@@ -307,7 +312,7 @@ class Island:
         rows = list(sets.unilateral[len(normals) :])
         wanted[rows] = np.maximum(limit_gaps / h + velocities[rows], 0.0)
         wanted[list(sets.free)] = np.clip(errors / h, -MAX_CORRECTION_SPEED, MAX_CORRECTION_SPEED)
-        return solve(sets, G, wanted, np.zeros(len(sets.disks))).impulses
+        return solve(sets, G, wanted, np.zeros(len(sets.disks)))
 
     def _at_rest(
         self,

@@ -101,7 +101,7 @@ class OwnStepper(Stepper):
         self._finder = ContactFinder(layout, self.dt) if layout.collides.any() else None
         self._warm: WarmStart = {}
         self._touches: list[TouchImpulse] | None = None
-        self._largest_residual, self._unsolved = 0.0, 0
+        self._largest_residual, self._unsolved, self._contradictory = 0.0, 0, 0
         self._moving = self._parts()
         robots = len(self._robots)
         self._part_of: dict[Owner, int] = {}
@@ -171,6 +171,7 @@ class OwnStepper(Stepper):
             if not island.residual <= MAX_RESIDUAL:
                 self._unsolved += 1
                 self._largest_residual = max(self._largest_residual, island.residual)
+            self._contradictory += not island.displacement_residual <= MAX_RESIDUAL
         for k in sorted(alone):
             self._moving[k].finish()
         self._touches, self._warm = touches, warm
@@ -295,13 +296,18 @@ class OwnStepper(Stepper):
         return points
 
     def notes(self) -> Sequence[str]:
-        if not self._unsolved:
-            return ()
-        times = "once" if self._unsolved == 1 else f"{self._unsolved} times"
-        return (
-            f"impulses of contacts and constraints missed their conditions {times} by more than "
-            f"{MAX_RESIDUAL:g} m/s, at most by {self._largest_residual:.3g}",
-        )
+        found = []
+        if self._unsolved:
+            found.append(
+                f"impulses of contacts and constraints missed their conditions {_times(self._unsolved)} by "
+                f"more than {MAX_RESIDUAL:g} m/s, at most by {self._largest_residual:.3g}"
+            )
+        if self._contradictory:
+            found.append(
+                f"overlaps and errors of constraints contradicted each other {_times(self._contradictory)}, "
+                "so that the step took them back in part only"
+            )
+        return found
 
     # -- end ----------------------------------------------------------------------------------
 
@@ -324,3 +330,7 @@ def _refuse_limited_ball_joints(robot: RobotLayout) -> None:
             "the engine 'dynx' does not have together with contacts and constraints; joint_limits=False "
             "switches limits off"
         )
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
