@@ -18,7 +18,7 @@ from dynx.rbd.integration import SemiImplicitEuler, moved_joints
 from dynx.spatial.plain import rotation_rows
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat
+from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
 from dynx.steppers.joint_stops import JointStops, bounds_of_step
 from dynx.steppers.layout import BodyLayout, RobotLayout, stop_positions
 from dynx.steppers.robot_step import RobotStep
@@ -99,7 +99,8 @@ class OwnRobot:
 
     def forget_placements(self) -> None:
         """Forget the poses of the last state."""
-        self.__dict__.pop("_placements", None)
+        for name in ("_placements", "_midpoint"):
+            self.__dict__.pop(name, None)
 
     def _end_velocity(self, a: Floats) -> Floats:
         if not self._floating:
@@ -133,6 +134,38 @@ class OwnRobot:
         """Return J (6, nv) of the origin of a moving body, in axes of the world."""
         J: Floats = self._step.dynamics.jacobian(self.q, self._frames[body + 1])
         return J
+
+    def midpoint_pose(self, body: int) -> Floats:
+        """Return the pose (4, 4) in the world of a moving body half a step after the beginning."""
+        if body == ROOT and not self._floating:
+            return np.eye(4)
+        T: Floats = self._midpoint[1][self._frame_numbers[body + 1]]
+        return T
+
+    def midpoint_jacobian(self, body: int) -> Floats:
+        """Return J (6, nv) as `jacobian` does, half a step after the beginning, for velocities in the axes in
+        which the step begins."""
+        q, _, base = self._midpoint
+        J: Floats = self._step.dynamics.jacobian(q, self._frames[body + 1])
+        return J if base is None else np.concatenate([J[:, :6] @ base, J[:, 6:]], axis=1)
+
+    @cached_property
+    def _midpoint(self) -> tuple[Floats, Floats, Floats | None]:
+        """Configuration (nq,) half a step after the beginning, poses of its frames, and for a floating base
+        the map (6, 6) from velocities in the axes of the beginning to those in its axes there.
+
+        The map keeps the velocity of the base's centre of mass, as `dynx.rbd.displacement` does.
+        """
+        q: Floats = self.engine.model.integrate(self.q, 0.5 * self._h * self.v)
+        placements: Floats = self.engine.forward_kinematics(q)
+        if not self._floating:
+            return q, placements, None
+        turn = rotation_from_quat(q[3:7]).T @ rotation_from_quat(self.q[3:7])
+        center = skew(self._scheme.center)
+        base = np.zeros((6, 6))
+        base[:3, :3] = base[3:, 3:] = turn
+        base[:3, 3:] = center @ turn - turn @ center
+        return q, placements, base
 
     def response(self, J: Floats) -> Floats:
         """Return A^-1 J' (nv, m), the changes of velocity by unit impulses on rows of J (m, nv)."""
@@ -230,6 +263,12 @@ class OwnBody(OwnRobot):
         R, J = self._placements[:3, :3], np.zeros((6, 6))
         J[:3, :3] = J[3:, 3:] = R
         return J
+
+    def midpoint_pose(self, body: int) -> Floats:
+        return super().midpoint_pose(ROOT)
+
+    def midpoint_jacobian(self, body: int) -> Floats:
+        return super().midpoint_jacobian(ROOT)
 
     @cached_property
     def _body_inverse(self) -> Floats:

@@ -18,6 +18,7 @@ from dynx.spatial.scalar import Floats
 from dynx.world import (
     Material,
     PDMotor,
+    PointToPoint,
     Scene,
     SceneBody,
     SceneRobot,
@@ -285,3 +286,59 @@ def test_overlaps_that_contradict_each_other_are_noted() -> None:
         world.step(2)
         assert sum("contradicted each other 2 times" in note for note in world.notes) == 1
         assert abs(world.state.bodies["held"].position[0]) < 1e-6
+
+
+@pytest.mark.parametrize("dt", [4e-3, 1e-3])
+def test_a_body_on_a_point_swings_without_losing_energy(dt: float) -> None:
+    post = box("post", (0.1, 0.1, 0.1), pose=dynx.Pose((-0.5, 0, 1.0)))
+    bob = box("bob", (0.1, 0.1, 0.1), mass=1.0, pose=dynx.Pose((0, 0, 1.0)))
+    joint = PointToPoint("post", "bob", point_a=(0.0, 0, 0), point_b=(-0.5, 0, 0))
+    # Half a period from horizontal: 2 K(1/2) sqrt(I / (m g l)) with K(1/2) = 1.8540746773.
+    half = 2.0 * 1.8540746773 * math.sqrt((0.25 + 0.01 / 6.0) / (G * 0.5))
+    with World(Scene("pendulum", bodies=(post, bob), constraints=(joint,)), "dynx", dt) as world:
+        heights = []
+        for _ in range(round(4.5 * half / dt)):
+            world.step()
+            heights.append(world.state.bodies["bob"].position[2])
+    rises = np.array(heights)
+    tops = 1 + np.flatnonzero((rises[1:-1] > rises[:-2]) & (rises[1:-1] >= rises[2:]))
+    assert len(tops) == 4
+    assert rises[tops] == pytest.approx(1.0, abs=3.0 * dt**2 * G**2)
+    assert (tops + 1) * dt == pytest.approx(half * np.arange(1, 5), abs=1.01 * dt)
+
+
+def test_a_link_on_a_point_swings_as_on_a_joint() -> None:
+    """A double pendulum of two links that a floating base and points hold, against one with joints."""
+    rod = (
+        '<inertial><origin xyz="0.25 0 0"/><mass value="1"/>'
+        '<inertia ixx="0.01" iyy="0.03" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    joint = (
+        '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/>{}'
+        '<axis xyz="0 1 0"/></joint>'
+    )
+    elbow = joint.format("elbow", "a", "b", '<origin xyz="0.5 0 0"/>')
+    links = f'<link name="a">{rod}</link><link name="b">{rod}</link>'
+    shoulder = joint.format("shoulder", "post", "a", "")
+    jointed = dynx.load(f'<robot name="r"><link name="post"/>{links}{shoulder}{elbow}</robot>')
+    floating = dynx.load(f'<robot name="r">{links}{elbow}</robot>', base="floating")
+    post = sphere("post", 0.01)
+    held = Scene(
+        "held",
+        robots=(SceneRobot("r", floating),),
+        bodies=(post,),
+        constraints=(PointToPoint("post", "r/a", point_a=(0.0, 0, 0), point_b=(0.0, 0, 0)),),
+    )
+    errors = []
+    for dt in (2e-3, 1e-3):
+        worlds = [
+            World(each, "dynx", dt, collisions=False)
+            for each in (held, Scene("j", robots=(SceneRobot("r", jointed),)))
+        ]
+        with worlds[0], worlds[1]:
+            for world in worlds:
+                world.run(0.8)
+            (q, _), (wanted, _) = (world.state.robots["r"] for world in worlds)
+        errors.append(abs(q[-1] - wanted[-1]))
+        assert np.abs(q[:3]).max() < 10.0 * dt**2
+    assert errors[1] < 0.7 * errors[0] < 0.02
