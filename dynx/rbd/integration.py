@@ -64,7 +64,11 @@ def floating_step(
 
 def moved_joints(q: Array, step: Array, balls: Sequence[int]) -> Array:
     """Return the positions of joints q (n,) after a displacement; `balls` as in `floating_step`."""
-    return integrate(q, step, floating=False, balls=balls) if balls else np.asarray(q + step)
+    if balls:
+        return integrate(q, step, floating=False, balls=balls)
+    # Not by np.asarray, which would take symbols of a caller's code out of their own kind of array.
+    moved: Array = q + step
+    return moved
 
 
 def _balls_of(model: Model) -> tuple[int, ...]:

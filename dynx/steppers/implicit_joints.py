@@ -12,6 +12,7 @@ import numpy as np
 
 from dynx.backends.dynamics import EngineDynamics
 from dynx.rbd.joint_friction import TOLERANCE, FrictionLaw, damped_equation
+from dynx.spatial.manifold import integrate
 from dynx.spatial.scalar import Floats
 from dynx.steppers.layout import RobotLayout
 
@@ -230,6 +231,8 @@ class OutsideJoints:
         robot, ahead = self._robot, self._h * v
         ahead[: 6 * robot.model.floating] = 0.0
         now, lower, upper = robot.joint_positions(q)
-        then, _, _ = robot.joint_positions(robot.model.integrate(q, ahead))
+        # Unchecked: the world notices that a motion has diverged, and names its cause.
+        floating, balls = robot.model.floating, robot.model.ball_places
+        then, _, _ = robot.joint_positions(integrate(q, ahead, floating=floating, balls=balls))
         below, above = np.minimum(now, then) <= lower, np.maximum(now, then) >= upper
         return bool(below.any() or above.any())

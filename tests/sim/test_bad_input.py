@@ -213,7 +213,7 @@ def test_what_an_engine_raises_is_ours_in_the_end(monkeypatch: pytest.MonkeyPatc
     def broken(*args: Any) -> Any:
         raise OverflowError("the engine has enough")
 
-    monkeypatch.setattr("dynx.steppers.integrators.SemiImplicitEuler.__call__", broken)
+    monkeypatch.setattr("dynx.steppers.integrators.SemiImplicitEuler.moved", broken)
     with pytest.raises(DivergedError, match="OverflowError: the engine has enough") as caught:
         simulate(ARM, None, REST, duration=0.01)
     assert len(caught.value.rollout) == 0

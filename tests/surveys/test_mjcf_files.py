@@ -35,5 +35,7 @@ def test_other_ends_have_words_of_their_own(tmp_path: Path) -> None:
     assert word_of(path, free + free.replace('"tip"', '"top"')) == "alike as a scene"
     ball = '<body><joint type="ball"/><geom size="1"/></body>'
     assert word_of(path, BODY.format('joint type="ball"')) == "alike"
-    assert word_of(path, free + ball) == "refused"
+    assert word_of(path, free + ball) == "alike as a scene"
+    cloth = '<flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" radius="0.01" dim="2"/>'
+    assert word_of(path, free + cloth) == "refused"
     assert word_of(path, BODY.format("joint").replace("/>", ' mass="x"/>', 1)).endswith("no robot in MuJoCo")

@@ -122,6 +122,8 @@ def _compare_robot(
         q[:3] = random.normal(size=3)
         q[3:7] = (quat := random.normal(size=4)) / np.linalg.norm(quat)
     q[shift:] += random.uniform(-1.0, 1.0, model.nq - shift)
+    for place in model.ball_places:
+        q[place : place + 4] /= np.linalg.norm(q[place : place + 4])
     v, a = random.normal(size=(2, model.nv))
     R = rotation_from_quat(q[3:7]) if model.floating else np.eye(3)
     turned = np.eye(model.nv)
@@ -129,8 +131,16 @@ def _compare_robot(
         turned[:3, :3] = R
         first = compiled.jnt_qposadr[joints[0]]
         data.qpos[first : first + 7] = q[[0, 1, 2, 6, 3, 4, 5]]
-    for joint, position in zip(joints[1 if model.floating else 0 :], q[shift:], strict=True):
-        data.qpos[compiled.jnt_qposadr[joint]] = position
+    place = shift
+    for joint in joints[1 if model.floating else 0 :]:
+        address = compiled.jnt_qposadr[joint]
+        if compiled.jnt_type[joint] == mujoco.mjtJoint.mjJNT_BALL:
+            data.qpos[address : address + 4] = q[[place + 3, place, place + 1, place + 2]]
+            place += 4
+        else:
+            data.qpos[address] = q[place]
+            place += 1
+    assert place == model.nq
     data.qvel[dofs] = turned @ v
     data.qacc[dofs] = turned @ (a + _transport(v, model.floating))
     for step in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_crb, mujoco.mj_comVel):
