@@ -19,9 +19,12 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, skew
 
-ALONG = 1e-5
-"""Sine of an angle [rad] below which two directions count as parallel, and share of the robot's reach below
-which two places count as one."""
+PARALLEL = 1e-12
+"""Sine of an angle [rad] below which two directions are parallel. Of a turn about directions that are nearly
+parallel, even what rounding leaves of it moves none of them."""
+
+APART = 1e-5
+"""Share of the robot's reach below which two places count as one."""
 
 ISOLATED = 1e-4
 """Relative difference of a principal moment from the others from which on its axis is a direction."""
@@ -103,13 +106,13 @@ def _add_offsets(found: _Features, reach: float) -> None:
     start, known = found.places[keys[0]]
     for key in keys[1:]:
         place, determined = found.places[key]
-        if float(np.max(np.abs(known @ determined - determined @ known))) <= ALONG:
+        if float(np.max(np.abs(known @ determined - determined @ known))) <= PARALLEL:
             _add_way(found, ("offset", key), known @ determined @ (place - start), reach)
 
 
 def _add_way(found: _Features, key: object, way: Floats, scale: float) -> None:
     length = float(np.linalg.norm(way))
-    if length > ALONG * scale:
+    if length > APART * scale:
         found.ways[key] = way / length
 
 
@@ -134,7 +137,7 @@ def _rotations(first: _Features, second: _Features) -> Iterator[Floats]:
         min(float(np.linalg.norm(cross(u, v))), float(np.linalg.norm(cross(x, y)))) for v, y, _ in directions
     ]
     best = int(np.argmax(sines))
-    if sines[best] <= ALONG:
+    if sines[best] <= PARALLEL:
         for sign in u_signs:
             yield _axes(u, _across(u)) @ _axes(sign * x, _across(x)).T
         return
@@ -162,4 +165,4 @@ def _shift(first: _Features, second: _Features, R: Floats) -> Floats:
         if key in second.places:
             rows.append(determined)
             wanted.append(determined @ (place - R @ second.places[key][0]))
-    return np.asarray(np.linalg.lstsq(np.concatenate(rows), np.concatenate(wanted), rcond=ALONG)[0])
+    return np.asarray(np.linalg.lstsq(np.concatenate(rows), np.concatenate(wanted), rcond=PARALLEL)[0])

@@ -61,6 +61,16 @@ def test_frames_of_a_robot_without_a_heavy_base_may_be_moved(case: str) -> None:
             assert all(each.sign == 1 for each in report.coordinates)
 
 
+def test_axes_that_are_nearly_parallel_determine_the_frame() -> None:
+    z, tilted = (0.0, 0.0, 1.0), (1e-7, 0.0, 1.0)
+    joints = [
+        Joint(f"j{k}", "revolute", f"l{k}", f"l{k + 1}", axis=axis) for k, axis in enumerate((z, z, tilted))
+    ]
+    model = Model.build("light", [Link(f"l{k}") for k in range(4)], joints, base="floating")
+    for seed in range(5):
+        assert same_robot(model, with_moved_frames(model, np.random.default_rng(seed))).same
+
+
 def test_a_point_mass_on_the_axis_of_a_light_base_at_no_distance_is_the_same() -> None:
     joint = Joint("j", "revolute", "a", "b", axis=(0.0, 0.0, 1.0))
     model = Model.build("light", [Link("a"), Link("b", Inertial(1.0))], [joint], base="floating")
