@@ -17,7 +17,7 @@ from dynx.same.skeleton import Skeleton
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import cross, skew
+from dynx.spatial.so3 import cross, rotation_about, skew
 
 PARALLEL = 1e-12
 """Sine of an angle [rad] below which two directions are parallel. Of a turn about directions that are nearly
@@ -52,7 +52,8 @@ def arrangements(ours: Skeleton, theirs: Skeleton, pairs: list[tuple[int, int]])
         first = _features(ours, [a for a, _ in pairs], grouped)
         second = _features(theirs, [b for _, b in pairs], grouped)
         for R in _rotations(first, second):
-            yield homogeneous(R, _shift(first, second, R))
+            D = homogeneous(R, _shift(first, second, R))
+            yield _refined(first, second, D, ours.reach) if _is_near(first, second, D, ours.reach) else D
 
 
 def _features(skeleton: Skeleton, order: list[int], grouped: bool) -> _Features:
@@ -166,3 +167,48 @@ def _shift(first: _Features, second: _Features, R: Floats) -> Floats:
             rows.append(determined)
             wanted.append(determined @ (place - R @ second.places[key][0]))
     return np.asarray(np.linalg.lstsq(np.concatenate(rows), np.concatenate(wanted), rcond=PARALLEL)[0])
+
+
+NEAR = 1e-3
+"""Misfit of places, relative to the robot's reach, up to which a frame is refined."""
+
+REFINEMENTS = 3
+"""Number of Newton steps; the misfit is squared by each."""
+
+
+def _is_near(first: _Features, second: _Features, D: Floats, reach: float) -> bool:
+    """Check whether a frame fits, but for what nearly parallel axes leave open in it."""
+    misfit, _ = _system(first, second, D, reach)
+    return bool(np.max(np.abs(misfit), initial=0.0) <= NEAR)
+
+
+def _refined(first: _Features, second: _Features, D: Floats, reach: float) -> Floats:
+    """Return the frame near to D (4, 4) in which axes and places of both robots fit best: a direction that
+    follows from nearly parallel axes has few digits, and the places of the axes have the others."""
+    for _ in range(REFINEMENTS):
+        misfit, slopes = _system(first, second, D, reach)
+        step = np.linalg.lstsq(slopes, -misfit, rcond=PARALLEL)[0]
+        turn = float(np.linalg.norm(step[:3]))
+        R = rotation_about(step[:3] / turn, np.asarray(turn)) if turn > 0.0 else np.eye(3)
+        D = homogeneous(R @ D[:3, :3], D[:3, 3] + reach * step[3:])
+    return D
+
+
+def _system(first: _Features, second: _Features, D: Floats, reach: float) -> tuple[Floats, Floats]:
+    """Return the misfits (m,) of axes and places, and their derivatives (m, 6) by a turn of the second robot
+    [rad] and by a shift per reach."""
+    misfits, slopes = [np.zeros(1)], [np.zeros((1, 6))]
+    R, p = D[:3, :3], D[:3, 3]
+    for key, axis in first.axes.items():
+        if key in second.axes:
+            other = R @ second.axes[key]
+            misfits.append(cross(axis, other))
+            slopes.append(
+                np.hstack([float(axis @ other) * np.eye(3) - np.outer(other, axis), np.zeros((3, 3))])
+            )
+    for key, (place, determined) in first.places.items():
+        if key in second.places:
+            turned = R @ second.places[key][0]
+            misfits.append(determined @ (turned + p - place) / reach)
+            slopes.append(np.hstack([-determined @ skew(turned) / reach, determined]))
+    return np.concatenate(misfits), np.concatenate(slopes)

@@ -71,6 +71,22 @@ def test_axes_that_are_nearly_parallel_determine_the_frame() -> None:
         assert same_robot(model, with_moved_frames(model, np.random.default_rng(seed))).same
 
 
+@pytest.mark.parametrize("tilt", [1e-5, 1e-8, 1e-10])
+@pytest.mark.parametrize("kind", ["prismatic", "revolute"])
+def test_axes_side_by_side_that_are_nearly_parallel_determine_the_frame(kind: JointType, tilt: float) -> None:
+    """Their directions leave a turn about them open but for few digits, which their places give."""
+    axes = (0.0, 0.0, 1.0), (tilt, 0.0, 1.0), (0.0, tilt, 1.0)
+    types: tuple[JointType, ...] = ("revolute", kind, "revolute")
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        places = [Pose(tuple(rng.uniform(-1.0, 1.0, 3))) for _ in axes]
+        joints = [
+            Joint(f"j{k}", types[k], f"l{k}", f"l{k + 1}", places[k], axis) for k, axis in enumerate(axes)
+        ]
+        model = Model.build("light", [Link(f"l{k}") for k in range(4)], joints, base="floating")
+        assert same_robot(model, with_moved_frames(model, rng)).same
+
+
 def test_a_point_mass_on_the_axis_of_a_light_base_at_no_distance_is_the_same() -> None:
     joint = Joint("j", "revolute", "a", "b", axis=(0.0, 0.0, 1.0))
     model = Model.build("light", [Link("a"), Link("b", Inertial(1.0))], [joint], base="floating")
