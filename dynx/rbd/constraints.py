@@ -256,6 +256,11 @@ LEAST_PROXIMAL, MOST_PROXIMAL = 1e-9, 1e-3
 """Bounds of the part of g on the diagonal of Newton's matrix. Redundant contacts make the matrix singular,
 and far from the solution large steps lead to wrong modes."""
 
+TIE = TOLERANCE
+"""Velocity [m/s or rad/s] up to which Newton's matrix takes a row at the boundary of its set as inside, where
+w = 0. At rest w and x - l may both be rounding. Rows that left their sets by rounding would carry nothing,
+and the impulses of redundant contacts would jump to the others."""
+
 NEWTON_STEPS = 40
 """Number of Newton's steps from one start."""
 
@@ -316,10 +321,13 @@ def solve(
         x = at
         for count in range(NEWTON_STEPS):
             cautious = count >= CAUTIOUS_FROM and count % 3 == 0
-            error, step = newton.step(x, attempt, cautious=cautious)
+            error, F, J = newton.equations(x, attempt, cautious=cautious)
             if error < least:
                 best, least = x, error
-            if step is None or error <= tolerance:
+            if error <= tolerance:
+                break
+            step = _finite_solution(J, -F)
+            if step is None:
                 break
             x = x + step
         taken += attempt.sweeps + count
@@ -366,8 +374,8 @@ class _Newton:
         self._floors = floors[self._unilateral]
         self._disks = [disks for rows in (1, 2) if (disks := _Disks(sets, limits, rows)).count]
 
-    def step(self, x: Floats, attempt: Attempt, *, cautious: bool) -> tuple[float, Floats | None]:
-        """Return the largest entry of F at x (m,), and Newton's step; None where there is no finite one."""
+    def equations(self, x: Floats, attempt: Attempt, *, cautious: bool) -> tuple[float, Floats, Floats]:
+        """Return the largest entry of F at x (m,), F (m,) and Newton's matrix (m, m)."""
         factor = attempt.factor
         G, g = self._G, factor * self._g
         w = self._c + G @ x
@@ -377,7 +385,7 @@ class _Newton:
         projected, follows = np.zeros(len(x)), np.zeros(len(x))
         rows = self._unilateral
         held = np.maximum(wanted[rows], self._floors)
-        inactive = rows[wanted[rows] <= self._floors]
+        inactive = rows[wanted[rows] <= self._floors - TIE / g[rows]]
         projected[rows], follows[rows], follows[inactive] = held, 1.0, 0.0
         F[rows] = g[rows] * (x[rows] - held)
         J[inactive] = 0.0
@@ -389,11 +397,16 @@ class _Newton:
         if not cautious:
             part = min(max(attempt.proximal * error / self._speed, LEAST_PROXIMAL), MOST_PROXIMAL)
         J.flat[:: len(x) + 1] += part * self._g
-        try:
-            step = np.linalg.solve(J, -F)
-        except np.linalg.LinAlgError:
-            return error, None
-        return error, step if np.isfinite(step).all() else None
+        return error, F, J
+
+
+def _finite_solution(A: Floats, b: Floats) -> Floats | None:
+    """Return x with A x = b; None where there is no finite one."""
+    try:
+        x = np.asarray(np.linalg.solve(A, b), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return None
+    return x if np.isfinite(x).all() else None
 
 
 class _Disks:
@@ -431,9 +444,15 @@ class _Disks:
         normals = self._normals[slips]
         u, scale = y / norm[:, None], g[rows[:, 0]]
         F[rows] = scale[:, None] * (x[rows] - radius[:, None] * u)
+        moves = norm > radius + TIE / scale
+        if not moves.any():
+            return
+        rows, y, norm, radius = rows[moves], y[moves], norm[moves], radius[moves]
+        normals, u, scale = normals[moves], u[moves], scale[moves]
+        chosen = np.flatnonzero(slips)[moves]
         # The radius changes with the impulse of the normal row.
         dr = np.zeros((len(rows), len(x)))
-        grows = self._limits[slips] * self._coupled[slips] * follows[normals]
+        grows = self._limits[chosen] * self._coupled[chosen] * follows[normals]
         each = np.arange(len(rows))
         dr[each, normals] = grows
         dr -= (grows / g[normals])[:, None] * G[normals]
