@@ -59,6 +59,8 @@ class RobotLoads:
         depend; None if there was no such step."""
         self.target_notes: list[str] = []
         """Sentences on targets of motors that are far beyond the limits of their joints."""
+        self.gain_notes: list[str] = []
+        """Sentence on gains of motors that are unstable in steps of the engine."""
 
     @cached_property
     def dynamics(self) -> Backend:
@@ -178,6 +180,24 @@ class RobotLoads:
                 from dynx.model.unlikely_inputs import target_notes
 
                 self.target_notes += target_notes(self.model, self.name, law.kp, law.target)
+            if not self.gain_notes:
+                self._note_gains()
+
+    @cached_property
+    def _mobility(self) -> Floats:
+        """Acceleration of each joint (n,) at the start for a unit of its own torque."""
+        from dynx.world.stiff_gains import mobility_of
+
+        return mobility_of(self.mass_matrix(self._robot.q))[self._base :]
+
+    def _note_gains(self) -> None:
+        """Keep a sentence on motors that are unstable at the start; contacts may keep their motion finite."""
+        law, implicit = self._law, self._implicit_joints
+        if ((1.0 - implicit) * (law.kp + law.kd) > 0.0).any():
+            from dynx.world.stiff_gains import stiff_gains  # a world without motors needs none
+
+            names = self.model.coordinate_names
+            self.gain_notes += stiff_gains(self.name, names, law, implicit, self._mobility, self._h)
 
     def torque(
         self,
@@ -405,10 +425,12 @@ class Commands:
         return total
 
     def notes(self) -> Iterator[str]:
-        """Yield one sentence for each inexact feature of a robot's joints, and those on targets of motors."""
+        """Yield one sentence for each inexact feature of a robot's joints, and those on targets and gains
+        of motors."""
         for loads in self._loads:
             yield from loads.notes(self._engine)
             yield from loads.target_notes
+            yield from loads.gain_notes
 
     def notes_on_springs(self) -> Iterator[str]:
         """Yield one sentence for each robot with springs that are unstable in steps of the engine."""

@@ -361,13 +361,15 @@ def _gravity(layout: Layout, h: float) -> Iterator[str]:
 
 
 def _gains_and_torques(layout: Layout, state: WorldState, loads: LastLoads, h: float) -> Iterator[str]:
+    from dynx.world.stiff_gains import mobility_of, stiff_gains
+
     for load in loads.robots:
         robot = layout.robots[load.robot]
-        mobility = _mobility(load.mass_matrix(state.robots[robot.name].q))
+        mobility = mobility_of(load.mass_matrix(state.robots[robot.name].q))
         names = robot.model.coordinate_names
         base = len(mobility) - len(names)
         if load.law is not None and load.implicit is not None and len(names):
-            yield from _stiff_gains(robot.name, names, load.law, load.implicit, mobility[base:], h)
+            yield from stiff_gains(robot.name, names, load.law, load.implicit, mobility[base:], h)
         if load.torque is not None and len(mobility):
             change = h * np.abs(load.torque) * mobility
             k = int(np.argmax(change))
@@ -379,38 +381,20 @@ def _gains_and_torques(layout: Layout, state: WorldState, loads: LastLoads, h: f
                 )
 
 
-def _stiff_gains(
-    robot: str, names: Sequence[str], law: JointLaw, implicit: Floats, mobility: Floats, h: float
-) -> Iterator[str]:
-    """Yield the joint whose law at the beginning of the step is unstable: h kd + h^2 kp / 2 > 2 inertia."""
-    damping = (1.0 - implicit) * h * law.kd * mobility
-    stiffness = (1.0 - implicit) * h * h * law.kp * mobility
-    k = int(np.argmax(damping + 0.5 * stiffness))
-    if damping[k] + 0.5 * stiffness[k] <= 2.0:
-        return
-    if damping[k] >= 0.5 * stiffness[k]:
-        gain, ratio, most = "kd dt", damping[k], 2
-    else:
-        gain, ratio, most = "kp dt^2", stiffness[k], 4
-    yield (
-        f"the gains of {shown(f'{robot}/{names[k]}')} are stiff for steps of {h:.3g} s: {gain} is "
-        f"{ratio:.3g} times the inertia, and such a motor is unstable above {most}; use a PositionMotor, "
-        "which has no such bound, smaller gains or more substeps"
-    )
-
-
 def _implicit_gains(layout: Layout, state: WorldState, loads: LastLoads, h: float) -> Iterator[str]:
     """Yield, for each robot, the motor at the end of a step whose gains are the largest for the inertia.
 
     It computes the velocity at the end of the step with the other forces of the step before. What these
     change by in a step acts as if there were no motor; the stiffer the gains, the harder the correction.
     """
+    from dynx.world.stiff_gains import mobility_of
+
     for load in loads.robots:
         robot = layout.robots[load.robot]
         names = robot.model.coordinate_names
         if load.law is None or load.implicit is None or not len(names):
             continue
-        mobility = _mobility(load.mass_matrix(state.robots[robot.name].q))[-len(names) :]
+        mobility = mobility_of(load.mass_matrix(state.robots[robot.name].q))[-len(names) :]
         ratio = load.implicit * h * (load.law.kd + h * load.law.kp) * mobility
         k = int(np.argmax(ratio))
         if ratio[k] > MIN_IMPLICIT_RATIO:
@@ -459,8 +443,3 @@ def _mass(layout: Layout, owner: Owner) -> float | None:
     if owner.robot is None:
         return layout.bodies[owner.body].mass
     return layout.robots[owner.robot].model.total_mass
-
-
-def _mobility(M: Floats) -> Floats:
-    """Return the acceleration of each coordinate (nv,) for a unit of its own torque."""
-    return np.asarray(np.linalg.pinv(M, hermitian=True).diagonal().copy() if len(M) else np.zeros(0))

@@ -274,8 +274,8 @@ class World:
         their limits, robots whose accelerations have no bound, parts that are too fast for the step,
         coefficients of contact that the engine does not have, joint dynamics that are not exact, a step that
         is long, angles of the scene that look like degrees, and given settings that the engine changes.
-        Targets of motors in later steps that look like degrees follow, and faults that the engine found in
-        its steps."""
+        Targets of motors in later steps that look like degrees follow, gains of motors that are unstable at
+        the start in steps of the engine, and faults that the engine found in its steps."""
         engine = self._motion.ready
         of_steps = () if engine is None else engine.notes()
         return tuple(dict.fromkeys((*self._notes, *self._commands.notes(), *of_steps)))

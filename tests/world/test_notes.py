@@ -241,6 +241,24 @@ def test_targets_of_motors_in_steps_are_noted_once_where_they_look_like_degrees(
 
 
 @pytest.mark.parametrize("engine", WORLDS)
+def test_gains_that_are_unstable_in_steps_are_noted_from_the_first_step(engine: str) -> None:
+    dog = dynx.load("a1", base="floating")
+    q = np.array([0, 0, 1.0, 0, 0, 0, 1, *[0.0, 0.8, -1.6] * 4])
+    with World(Scene("s", robots=[SceneRobot("dog", dog, q=tuple(q))]), engine, dt=4e-3) as world:
+        before = world.notes
+        # Neither gains within the bound nor those of a motor at the end of the step.
+        for motor in (PDMotor(q[7:], 100.0, 2.0), PositionMotor(q[7:], 100.0, 8.0)):
+            world.step(motors={"dog": motor})
+        assert world.notes == before
+        for _ in range(2):
+            world.step(motors={"dog": PDMotor(q[7:], 100.0, 8.0)})
+        M = dynx.backend("reference", dog).mass_matrix(q)
+        ratio = 8.0 * 4e-3 * np.linalg.inv(M).diagonal()[6:].max()
+        (note,) = set(world.notes) - set(before)
+        assert f"kd dt is {ratio:.3g} times the inertia, and such a motor is unstable above 2" in note
+
+
+@pytest.mark.parametrize("engine", WORLDS)
 def test_an_ellipsoid_rests_on_its_shortest_half_axis_and_bullet_says_what_it_has(engine: str) -> None:
     lens = ellipsoid("lens", (0.2, 0.3, 0.1), mass=1.0, pose=Pose((0.0, 0.0, 0.11)))
     with World(Scene("s", bodies=(ground(), lens)), engine) as world:
