@@ -252,9 +252,9 @@ contacts may leave a little more than `TOLERANCE`, and further attempts do not i
 ROUNDING = 16.0 * FLOAT64_EPS
 """Residual relative to the largest sum of |G| |x| that is rounding."""
 
-LEAST_PROXIMAL, MOST_PROXIMAL = 1e-9, 1e-3
-"""Bounds of the part of g on the diagonal of Newton's matrix. Redundant contacts make the matrix singular,
-and far from the solution large steps lead to wrong modes."""
+MOST_PROXIMAL = 1e-3
+"""Largest part of g on the diagonal of Newton's matrix. Far from the solution large steps lead to wrong
+modes."""
 
 TIE = TOLERANCE
 """Velocity [m/s or rad/s] up to which Newton's matrix takes a row at the boundary of its set as inside, where
@@ -277,18 +277,21 @@ class Attempt(NamedTuple):
     """Factor of g in its projections, which changes no solution, but the modes on the way."""
     proximal: float
     """Part of g on the diagonal, times the largest entry of F relative to that of c."""
+    least: float
+    """Least part of g on the diagonal. Redundant contacts make the matrix singular: a small part lets their
+    impulses jump from modes to others, a large one is slow where a heavy body rests on a light one."""
 
 
 ATTEMPTS = (
-    Attempt(0, 1.0, 1e-3),
-    Attempt(0, 1.0, 0.0),
-    Attempt(10, 0.3, 1e-3),
-    Attempt(10, 3.0, 0.0),
-    Attempt(20, 1.0, 1e-3),
-    Attempt(40, 0.3, 0.0),
-    Attempt(40, 3.0, 1e-3),
-    Attempt(80, 1.0, 0.0),
-    Attempt(80, 0.3, 1e-3),
+    Attempt(0, 1.0, 1e-3, 1e-9),
+    Attempt(0, 1.0, 0.0, 1e-7),
+    Attempt(10, 0.3, 1e-3, 1e-7),
+    Attempt(10, 3.0, 0.0, 1e-9),
+    Attempt(20, 1.0, 1e-3, 1e-6),
+    Attempt(40, 0.3, 0.0, 1e-9),
+    Attempt(40, 3.0, 1e-3, 1e-7),
+    Attempt(80, 1.0, 0.0, 1e-9),
+    Attempt(80, 0.3, 1e-3, 1e-7),
 )
 
 
@@ -395,7 +398,7 @@ class _Newton:
         error = float(np.abs(F).max(initial=0.0)) / min(factor, 1.0)
         part = MOST_PROXIMAL
         if not cautious:
-            part = min(max(attempt.proximal * error / self._speed, LEAST_PROXIMAL), MOST_PROXIMAL)
+            part = min(max(attempt.proximal * error / self._speed, attempt.least), MOST_PROXIMAL)
         J.flat[:: len(x) + 1] += part * self._g
         return error, F, J
 
