@@ -52,6 +52,10 @@ HINTS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: untyped.World(Scene("s"), timestep=0.01),
         "no setting 'timestep'; did you mean 'dt'",
     ),
+    "a setting like no other": (
+        lambda: untyped.World(Scene("s"), "dynx", foo=1),
+        r"\d+ are known, such as backend, integrator, method, rtol, atol",
+    ),
     "gravity of a world": (lambda: untyped.World(Scene("s"), gravity=(0, 0, -1)), r"Scene\(gravity=...\)"),
     "gravity of a simulation": (
         lambda: untyped.simulate(ARM, gravity=(0, 0, -1), duration=0.1),

@@ -15,7 +15,7 @@ from dynx.distance.placed_solids import PlacedSolid, placed_cores
 from dynx.distance.plane_contacts import plane_candidates
 from dynx.distance.separating_axes import best_axis, tangent_radius
 from dynx.distance.support_features import ContactFrame, SupportFeature, frame_along, support_feature
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, DTypeError, shown
 from dynx.spatial.plain import Vector3, cross, dot, minus
 
 SAME_NORMAL = 1.0 - 1e-6
@@ -54,8 +54,17 @@ def contact_points(a: PlacedSolid, b: PlacedSolid, within: float, limit: int = 4
 
     The least gap is the signed distance of the shapes, to 1e-8 of their size. Of more points, those of the
     largest area remain, and the deepest one. Raises ArgumentError for two grounds (planes, height fields),
-    and for a limit below 1.
+    for a negative `within`, and for a limit below 1; DTypeError for a shape that is not placed.
     """
+    # The engine `dynx` calls this for each pair in each step, so the checks are few.
+    for name, shape in (("a", a), ("b", b)):
+        if not isinstance(shape, PlacedSolid):
+            raise DTypeError(
+                f"{name} is {shown(shape)}, of type {type(shape).__name__}; wanted a PlacedSolid: the shape "
+                "at its pose"
+            )
+    if not within >= 0.0:
+        raise ArgumentError(f"within is {within:g}; wanted a gap of at least 0 [m]")
     if limit < 1:
         raise ArgumentError(f"limit is {limit}; wanted at least 1 contact point")
     order_a, order_b = _order(a), _order(b)

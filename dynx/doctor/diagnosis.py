@@ -569,7 +569,8 @@ def _of_format(
         taking = examiner.for_ball_joints()
         for name in examiner.engines:
             if name not in taking.engines and (engines is not None or not taking.engines):
-                refuse_ball_joints(model, f"the comparison of files as {shown(name)} loads them")
+                what = f"the comparison of files as {shown(name)} loads them"
+                refuse_ball_joints(model, what, "that as 'mujoco' loads them does")
         examiner, variants = taking, variants.for_ball_joints()
     return examiner, variants
 

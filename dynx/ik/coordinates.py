@@ -43,7 +43,7 @@ class FrameCoordinates:
         if margin is not None and model.ball_joints:
             from dynx.model.ball_joints import refuse_ball_joints  # most robots have none
 
-            refuse_ball_joints(model, "limit_margin of inverse kinematics")
+            refuse_ball_joints(model, "inverse kinematics with limit_margin")
         self._model = model
         self.floating = model.floating
         """Whether the first six coordinates are those of a floating base."""

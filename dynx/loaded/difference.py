@@ -218,11 +218,15 @@ def _offset_inertia(inertial: LoadedInertial) -> float:
 
 
 def _joint(joint: Joint, held: LoadedJoint, reach: float) -> Iterator[tuple[str, Any, Any]]:
-    if (joint.type == "prismatic") != (held.type == "prismatic") or held.type not in _KINDS:
+    ball = joint.type == "ball"
+    if (joint.type == "prismatic") != (held.type == "prismatic") or held.type not in (
+        _BALL_KINDS if ball else _KINDS
+    ):
         yield "type", joint.type, held.type
     if held.placement is not None:
         yield from _pose(joint.origin.matrix, held.placement, reach)
-    if held.axis is not None and _differ(np.array(joint.axis), held.axis):
+    # A ball joint has no axis.
+    if not ball and held.axis is not None and _differ(np.array(joint.axis), held.axis):
         yield "axis", list(joint.axis), held.axis.tolist()
     if held.limits is not None:
         yield from _ends(joint, held.limits)
@@ -239,6 +243,7 @@ def _joint(joint: Joint, held: LoadedJoint, reach: float) -> Iterator[tuple[str,
 
 
 _KINDS = ("revolute", "continuous", "prismatic")
+_BALL_KINDS = ("ball", "spherical")
 
 
 def _ends(joint: Joint, held: tuple[float, float]) -> Iterator[tuple[str, Any, Any]]:
@@ -247,6 +252,9 @@ def _ends(joint: Joint, held: tuple[float, float]) -> Iterator[tuple[str, Any, A
         return
     size = max([abs(end) for end in (*file, *held) if abs(end) < NO_LIMIT], default=0.0)
     for property, wanted, value in zip(("lower", "upper"), file, held, strict=True):
+        # The limit of a ball joint is its largest angle alone.
+        if joint.type == "ball" and property == "lower":
+            continue
         both_free = min(abs(wanted), abs(value)) >= NO_LIMIT and wanted * value > 0.0
         if not both_free and _differ(wanted, value, size):
             yield property, _number(wanted), _number(value)

@@ -8,10 +8,10 @@ from dynx.model.tree import Tree
 BACKENDS_WITH_BALL_JOINTS = "the backends 'reference', 'compiled', 'pinocchio' and 'mujoco' do"
 
 
-def refuse_ball_joints(tree: Tree, what: str, instead: str = BACKENDS_WITH_BALL_JOINTS) -> None:
+def refuse_ball_joints(tree: Tree, what: str, instead: str = "") -> None:
     """Raise UnsupportedFeatureError, which names the joint, if the robot has a ball joint.
 
-    `what` takes none, and says so: "inverse kinematics", "simulate". `instead` is a clause on what does.
+    `what` takes none: "URDF", "same_robot". `instead` is a clause on what does, such as "MJCF and SDF do".
     """
     if tree.ball_joints:
         joint = tree.ball_joints[0]
@@ -21,12 +21,13 @@ def refuse_ball_joints(tree: Tree, what: str, instead: str = BACKENDS_WITH_BALL_
 def refuse_ball_joints_of_backend(tree: Tree, backend: str) -> None:
     """Raise EngineLimitError, which names the joint, if the robot has a ball joint."""
     if tree.ball_joints:
-        raise EngineLimitError(_refusal(tree, f"the backend {shown(backend)}"))
+        raise EngineLimitError(_refusal(tree, f"the backend {shown(backend)}", BACKENDS_WITH_BALL_JOINTS))
 
 
-def _refusal(tree: Tree, what: str, instead: str = BACKENDS_WITH_BALL_JOINTS) -> str:
+def _refusal(tree: Tree, what: str, instead: str) -> str:
     joint = tree.ball_joints[0].name
-    return f"{shown(joint)} of {tree.name} is a ball joint, which {what} does not take; {instead}"
+    clause = f"; {instead}" if instead else ""
+    return f"{shown(joint)} of {tree.name} is a ball joint, which {what} does not take{clause}"
 
 
 def _source(tree: Tree) -> str | None:

@@ -137,7 +137,7 @@ def real_array(name: str, value: ArrayLike) -> Floats:
     if array.dtype.kind not in "fiu":
         origin = "" if array is value else f" (it is {shown(value)}, of type {type(value).__name__})"
         if isinstance(value, Mapping):
-            origin += "; numbers of joints by name: [values[name] for name in model.joint_names]"
+            origin += "; set entries by joint: q[model.position_index(name)], v[model.coordinate_index(name)]"
         raise DTypeError(f"{name} has dtype {array.dtype}; wanted real numbers (float64){origin}")
     return np.asarray(array, dtype=np.float64)
 

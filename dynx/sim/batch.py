@@ -733,8 +733,12 @@ def refuse_uncompiled(scenario: Scenario) -> None:
         )
     for name in ("controller", "reference"):
         if getattr(scenario, name) is None:
-            why = ", also with needs_setpoint = False: errors are measured from it (such as model.neutral())"
-            raise ArgumentError(f"{name} is None; a batch needs one{why if name == 'reference' else ''}")
+            why = {
+                "controller": "; control.PD(model, kp=0.0, kd=0.0) applies no torque",
+                "reference": ", also with needs_setpoint = False: errors are measured from it (such as "
+                "model.neutral())",
+            }
+            raise ArgumentError(f"{name} is None; a batch needs one{why[name]}")
     require_duration(scenario)
 
 

@@ -206,9 +206,12 @@ def checked_reference(model: Model, reference: Any, *, within_limits: bool) -> S
     if not isinstance(reference, Trajectory):
         return _held(model, reference, within_limits)
     if (reference.nq, reference.nv) != (model.nq, model.nv):
+        # A motion made without the model takes each quaternion for four independent coordinates.
+        lacks_model = model.quaternions and reference.nq == reference.nv == model.nq
         raise ArgumentError(
             f"the reference has nq {reference.nq} and nv {reference.nv}; "
             f"{model.name} has nq {model.nq} and nv {model.nv}"
+            + ("; give the trajectory model=..., so that it knows the quaternions" if lacks_model else "")
         )
     if within_limits:
         try:

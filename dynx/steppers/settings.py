@@ -77,7 +77,7 @@ def checked_settings(
                     "settings of an engine are given by their names, such as "
                     f"{next(iter(known), 'name')}=..., or as **settings"
                 )
-            near = right_name(name, [*options, *known])
+            near = right_name(name, dict.fromkeys([*known, *options]))
             raise UnknownNameError(f"the engine {shown(engine)} has no setting {shown(name)}{near}")
     return {
         name: setting.checked(name, given[name]) if name in given else setting.default

@@ -32,9 +32,9 @@ class Trajectory(ABC):
     """A motion over ``0 <= t <= duration`` [s]: ``trajectory(t)`` returns its `Setpoint`.
 
     `v` and `a` are velocity and acceleration as in all of dynx. `v` has the velocities of the joints and,
-    with a floating base, the linear and angular velocity of the base frame in its own axes. `a` has their
-    time derivatives. Where `a` jumps, its value is the one after the jump; at ``duration``, the one before
-    the jump.
+    with a floating base, the linear and angular velocity of the base frame in its own axes; of a ball joint,
+    the angular velocity of its child link in the link's axes. `a` has their time derivatives. Where `a`
+    jumps, its value is the one after the jump; at ``duration``, the one before the jump.
 
     Before 0 and after `duration` the robot is at rest at `start.q` and `end.q`. At these two times the
     setpoint is exactly `start` or `end`, without rounding. Trajectories are immutable and can be pickled;

@@ -53,7 +53,8 @@ def trapezoidal(
     `velocity` and `acceleration` are limits, one number or (nv,); infinity means no limit. The default of
     `velocity` is the limit of the `model`. The motion is the fastest on the straight line, so some joint is
     at a limit at any time. If `duration` [s] is longer, the motion takes this time, and time is scaled
-    uniformly. A floating base needs the `model` and moves along one screw axis.
+    uniformly. A robot with a floating base or ball joints needs its `model`: the base moves along one
+    screw axis, and the child link of a ball joint turns about one axis.
 
     Raises ArgumentError for limits that are negative, or infinite for every moving joint; TrajectoryError for
     a limit of 0 of a joint that has to move, and for a duration that is too short.
@@ -157,8 +158,9 @@ def cycloidal(q0: ArrayLike, q1: ArrayLike, duration: float, *, model: Model | N
         q = q0 + (q1 - q0) (t/T - sin(2 pi t/T) / (2 pi))
 
     The largest speed is 2 (q1 - q0) / T, at T/2; the largest acceleration 2 pi (q1 - q0) / T^2, at T/4 and
-    3T/4. A robot with a floating base needs its `model`: the base moves along one screw axis, and v, a are in
-    its axes. The quaternion of q1 may be returned with the opposite sign, which is the same orientation.
+    3T/4. A robot with a floating base or ball joints needs its `model`: the base moves along one screw axis,
+    and v, a are in its axes; the child link of a ball joint turns about one axis. A quaternion of q1 may be
+    returned with the opposite sign, which is the same orientation.
 
     Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for invalid arguments.
     """
@@ -208,8 +210,9 @@ def cubic(
     """Return the cubic from `q0` with velocity `v0` to `q1` with `v1` in `duration` [s]; v0, v1 default to 0.
 
     Of all motions between these states it has the smallest integral of a^2. Its acceleration jumps at the
-    ends: from rest to rest it is 6 (q1 - q0) / T^2 there. A floating base needs the `model`, moves along one
-    screw axis and must start and end at rest: v0[:6] and v1[:6] must be 0.
+    ends: from rest to rest it is 6 (q1 - q0) / T^2 there. A robot with a floating base or ball joints
+    needs its `model`: the base moves along one screw axis, the child link of a ball joint turns about one
+    axis, and both start and end at rest, so their entries of v0 and v1 must be 0.
 
     Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for invalid arguments.
     """
@@ -238,8 +241,9 @@ def quintic(
     """Return the quintic from the state (`q0`, `v0`, `a0`) to (`q1`, `v1`, `a1`) in `duration` [s].
 
     v and a default to 0. Of all motions between these states it has the smallest integral of the squared
-    jerk. A floating base needs the `model`, moves along one screw axis and must start and end at rest: the
-    first six entries of v and a must be 0.
+    jerk. A robot with a floating base or ball joints needs its `model`: the base moves along one screw axis,
+    the child link of a ball joint turns about one axis, and both start and end at rest, so their entries of v
+    and a must be 0.
 
     Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for invalid arguments.
     """

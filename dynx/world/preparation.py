@@ -146,7 +146,8 @@ def layout_for(kind: type[Stepper], layout: Layout) -> Layout:
     provided = kind.provides(layout)
     for robot in layout.robots:
         if robot.model.ball_joints and not kind.takes_ball_joints:
-            refuse_ball_joints(robot.model, f"a world on {shown(kind.name)}")
+            instead = "the world engines 'mujoco' and 'dynx' do"
+            refuse_ball_joints(robot.model, f"a world on {shown(kind.name)}", instead)
     limited = any(robot.limited for robot in layout.robots)
     needed = {
         Feature.CONTACTS: layout.collides.any(),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dynx.distance import Hull, distance, separation, support
+from dynx.distance import Hull, PlacedSolid, contact_points, distance, separation, support
 from dynx.errors import ArgumentError, DTypeError, DynxError, NotFiniteError, RobotNotFoundError, ShapeError
 from dynx.model.elements import Pose
 from dynx.model.geometry import Box, HeightField, Mesh, Plane, Sphere
@@ -36,6 +36,21 @@ FAULTS: dict[str, tuple[Callable[[], object], type[DynxError], str]] = {
     "points in a plane": (lambda: Hull(np.zeros((5, 2))), ShapeError, r"points(\[| has)"),
     "points as text": (lambda: Hull(["a", "b"]), DTypeError, r"points(\[| has)"),  # type: ignore[arg-type]
     "points of NaN": (lambda: Hull([[0.0, np.nan, 0.0]]), NotFiniteError, r"points(\[| has)"),  # type: ignore[arg-type]
+    "contact of a shape without a pose": (
+        lambda: contact_points(PlacedSolid(BRICK), Plane(), 0.1),  # type: ignore[arg-type]
+        ArgumentError,
+        r"b is .*of type Plane; wanted a PlacedSolid",
+    ),
+    "contacts within a negative gap": (
+        lambda: contact_points(PlacedSolid(BRICK), PlacedSolid(BALL), -1.0),
+        ArgumentError,
+        "within is -1; wanted a gap of at least 0",
+    ),
+    "contacts within no number": (
+        lambda: contact_points(PlacedSolid(BRICK), PlacedSolid(BALL), np.nan),
+        ArgumentError,
+        "within is nan",
+    ),
     "no file": (lambda: distance(Mesh("/nowhere.stl"), HERE, BALL, HERE), RobotNotFoundError, "nowhere"),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 
 import dynx
 from dynx.doctor.examination import draw_states
-from dynx.model import JointDynamics, Limits
+from dynx.model import JointDynamics, Limits, Model
 from dynx.model.limited_positions import limited_positions
 from tests.sim.test_ball_joints import arm, each_base
 
@@ -30,6 +31,13 @@ def test_a_file_that_mujoco_loads_alike(base: Any, tmp_path: Path) -> None:
         assert report.error is None
         assert report.alike
         assert [each.engine for each in report.engines] == ["mujoco"]
+
+
+def test_the_axis_of_a_ball_joint_is_no_difference(tmp_path: Path) -> None:
+    """MuJoCo calls it spherical, with an axis of its own and no lower limit, which mean nothing."""
+    bent = replace(arm().joint("shoulder"), axis=(1.0, 0.0, 0.0), limits=Limits(upper=0.5))
+    model = Model.build("arm", arm().links, [bent, *arm().joints[1:]])
+    assert dynx.diagnose(written(tmp_path, model.to_mjcf())).model_difference == ()
 
 
 def test_joint_dynamics_of_a_ball_joint_are_causes(tmp_path: Path) -> None:

@@ -182,7 +182,7 @@ BAD: list[tuple[object, type[Exception], str]] = [
     ([[0.0] * 7, [0.0] * 6], ShapeError, "q is ragged"),
     (["a"] * 7, DTypeError, "wanted real numbers"),
     ([None] * 7, DTypeError, "wanted real numbers"),
-    ({"hinge": 0.3}, DTypeError, r"of type dict\); numbers of joints by name: \[values\[name\] for name in"),
+    ({"hinge": 0.3}, DTypeError, r"; set entries by joint: q\[model\.position_index\(name\)\], v\["),
     (np.zeros(7, dtype=complex), DTypeError, "q has dtype complex128"),
     ([True] * 7, DTypeError, "q has dtype bool"),
     ([0, 0, 0, 0, 0, math.nan, 1], NotFiniteError, r"q\[5\] is nan"),

@@ -155,7 +155,9 @@ def _joint_table(model: Model) -> Table:
         if not joint.moves:
             continue
         limits = joint.limits
-        bounds = (limits.lower, limits.upper, limits.velocity, limits.effort)
+        # The limit of a ball joint is its largest angle alone.
+        lower = -math.inf if joint.type == "ball" else limits.lower
+        bounds = (lower, limits.upper, limits.velocity, limits.effort)
         table.add_row(
             str(index.get(joint.name, "")),
             one_line(joint.name),

@@ -26,8 +26,10 @@ from dynx.cli.sim.request import SimulationRequest, limit_message, prepare
 from dynx.cli.sim.tutorial import run_tutorial
 from dynx.errors import ArgumentError, DynxError, LimitError, NotInstalledError, SimulationError, shown
 from dynx.files.figures import picture_format
+from dynx.model import Model
 from dynx.sim import Rollout, RolloutInterrupted, simulate
 from dynx.sim.record.formats import WRITERS
+from dynx.sim.record.mcap_file import refuse_unwritable
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,11 @@ class Outputs:
                 raise ArgumentError(f"{shown(path, 300)} would be written twice")
         if self.plot is not None:
             picture_format(self.plot)
+
+    def check_robot(self, model: Model) -> None:
+        """Raise UnsupportedFeatureError for a robot that the format of a file cannot have."""
+        if any(path.lower().endswith(".mcap") for path in self.save):
+            refuse_unwritable(model)
 
     def write(self, rollout: Rollout) -> dict[str, DynxError]:
         """Write all files; return the errors of those that cannot be written, by path."""
@@ -98,7 +105,9 @@ def sim(robot: str | None, tutorial: bool, json_path: str | None, **given: Any) 
     if robot is None:
         raise click.UsageError("ROBOT is missing; only --tutorial has a default", context)
     outputs.check()
-    return run_sim(prepare({"robot": robot, **given}), outputs, json_path=json_path)
+    request = prepare({"robot": robot, **given})
+    outputs.check_robot(request.scenario.model)
+    return run_sim(request, outputs, json_path=json_path)
 
 
 def _refuse_beside_tutorial(context: click.Context) -> None:

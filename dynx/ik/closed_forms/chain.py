@@ -58,7 +58,7 @@ def chain_to(model: Model, frame: str, given: Mapping[str, float]) -> Chain:
     Raises NoClosedFormError for a floating base, and for a joint of the chain that is coupled to another;
     UnknownNameError or ArgumentError for `given`.
     """
-    refuse_ball_joints(model, "inverse kinematics")
+    refuse_ball_joints(model, "a closed form of inverse kinematics", "inverse_kinematics of a backend does")
     given = checked_given(model, given)
     if model.floating:
         raise NoClosedFormError(f"{model.name} has a floating base; the closed form needs a fixed one")

@@ -353,7 +353,7 @@ class SdfWriter:
 
 _RENAMED = "Parts have other names, as SDF reserves some and names no two parts alike; dynx reads their own"
 _LOCKED = "Locked joints are fixed, without their axes and limits; dynx reads their positions"
-_BALL = "The axis of a ball joint has no meaning but for its damping"
+_BALL = "The damping of a ball joint is in its <axis>, whose direction has no effect"
 _ARMATURE = "Armature is in <drake:rotor_inertia>, which Drake and dynx read"
 _LIMIT = "A limit is in an element of dynx, because SDF takes such a number for no limit"
 

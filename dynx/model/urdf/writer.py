@@ -148,7 +148,7 @@ def urdf_text(
     image_path: ImagePath = _as_it_is,
 ) -> str:
     """Return the robot as `write_urdf` does, with other paths of meshes and images."""
-    refuse_ball_joints(tree, "URDF")
+    refuse_ball_joints(tree, "URDF", "MJCF and SDF do")
     lines = ['<?xml version="1.0"?>', f"<robot name={_name(tree.name)}>", *_settings(tree)]
     for link in tree.links:
         content = [] if link.inertial is None else [*_inertial(link.inertial)]

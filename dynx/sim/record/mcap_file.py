@@ -22,6 +22,7 @@ from dynx.errors import ArgumentError, DynxError, importing, shown
 from dynx.files.documents import parse_json
 from dynx.files.reading import MAX_BINARY_BYTES, checked_path, open_regular, printable, require_size
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.documents import pose_numbers, robot_from_document
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.record.ros_messages import MessageReader, schema_name, schema_text, topics_of
@@ -44,8 +45,16 @@ ABOUT_CHANNEL = {"offered_qos_profiles": ""}
 """Entry that the ROS 2 profile of MCAP requires; an empty one leaves the quality of service to the player."""
 
 
+def refuse_unwritable(model: Model) -> None:
+    """Raise UnsupportedFeatureError for a robot that a recording cannot have: its messages have one position
+    and one velocity for each joint."""
+    refuse_ball_joints(model, "a .mcap file", "files in .npz and .csv do")
+
+
 def write_mcap(rollout: Rollout, file: BinaryIO) -> None:
-    """Write `rollout` as a recording. Raises NotInstalledError without mcap (extra ``mcap``)."""
+    """Write `rollout` as a recording. Raises NotInstalledError without mcap (extra ``mcap``), and
+    UnsupportedFeatureError for a robot with ball joints."""
+    refuse_unwritable(rollout.model)
     with importing("a .mcap file needs mcap: pip install 'dynx[mcap]'"):
         from mcap.writer import Writer
     writer = Writer(file)
