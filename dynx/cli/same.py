@@ -82,6 +82,9 @@ def same(
     else:
         out = console()
         show(out, document)
+        if fix is not None and report.same:
+            kept = " (other differences are not mended)" if report.attributes else ""
+            out.print(f"nothing to mend{kept}: {one_line(fix)} is not written")
         if known is not None:
             who = f"{one_line(report.first)} and {one_line(report.second)}"
             show_comparison(out, who, known.compare(report))

@@ -40,6 +40,7 @@ from dynx.files.links import refuse_links
 from dynx.files.writing import write_bytes
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.registry import installed_worlds
+from dynx.steppers.settings import Setting
 from dynx.world import World
 from dynx.world.comparison import (
     SEPARATIONS,
@@ -52,6 +53,9 @@ from dynx.world.mjcf import mjcf_remarks, scene_to_mjcf
 from dynx.world.scene import Scene, body_to_urdf, read_scene, write_scene
 from dynx.world.separation import Separation
 from dynx.world.snapshot import check_world_suffix
+
+OPTIONS = {"joint_limits": Setting(True, "False: joints pass their limits")}
+"""Options of a world that ``--set`` gives besides the settings of the engines."""
 
 
 def world(
@@ -93,7 +97,7 @@ def world(
         picture_format(plot_path)
     chosen = engines or installed_worlds()
     described = read_scene(scene, keyframe=keyframe)
-    given = settings_by_engine(chosen, settings)
+    given = settings_by_engine(chosen, settings, OPTIONS)
     if save_path is not None:
         for engine in chosen:
             own_path(save_path, engine, len(chosen))  # Before the run, not after it.
@@ -115,6 +119,7 @@ def world(
                     substeps=substeps,
                     settings=given,
                     contact_interval=contact_interval,
+                    leave_out=engines is None,
                     finish=save,
                     progress=progress,
                 )
@@ -253,6 +258,13 @@ class SeparationEntry(TypedDict):
     parted: list[PartedEntry]
 
 
+class RefusalEntry(TypedDict):
+    """An engine that refuses the scene and was left out, and why."""
+
+    engine: str
+    reason: str
+
+
 class WorldDocument(TypedDict):
     """One scene run by one engine or several."""
 
@@ -264,6 +276,7 @@ class WorldDocument(TypedDict):
     contact_interval: float | None
     engines: list[EngineEntry]
     separations: list[SeparationEntry]
+    left_out: list[RefusalEntry]
 
 
 def document(comparison: WorldComparison) -> WorldDocument:
@@ -275,6 +288,7 @@ def document(comparison: WorldComparison) -> WorldDocument:
         scene=comparison.scene.name,
         engines=[_engine(comparison, run) for run in comparison.runs],
         separations=[_separation(each) for each in comparison.separations],
+        left_out=[RefusalEntry(engine=each.engine, reason=each.reason) for each in comparison.left_out],
     )
 
 
@@ -342,6 +356,8 @@ def show(out: Console, report: Entry) -> None:
             out.print(
                 f"{each['engine']} ended at {each['time']:.6g} s: {one_line(each['error'])}", style="red"
             )
+    for each in report["left_out"]:
+        out.print(f"note: without {each['engine']}: {one_line(each['reason'])}", style="yellow")
     _show_notes(out, engines)
     _show_bodies(out, engines)
     _show_robots(out, engines)

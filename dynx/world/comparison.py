@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dynx.errors import ArgumentError, DynxError
+from dynx.errors import ArgumentError, DynxError, UnsupportedFeatureError
 from dynx.model.mechanism import ROOT
 from dynx.model.numbers import positive_seconds, whole_number
 from dynx.rbd.kinematics import body_poses
@@ -56,6 +56,13 @@ class EngineRun:
     """Mean force of each pair that touched in the last `contact_interval`, if that is given."""
 
 
+class Refusal(NamedTuple):
+    """An engine that refuses a scene, and why."""
+
+    engine: str
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class WorldComparison:
     """Runs of one scene by several engines."""
@@ -70,6 +77,8 @@ class WorldComparison:
     for each pair of engines (`Separation.records`)."""
     contact_interval: float | None = None
     """Interval [s] of `EngineRun.mean_contacts`; None where contacts were not summed."""
+    left_out: tuple[Refusal, ...] = ()
+    """Engines that refuse the scene and were left out."""
 
     def __repr__(self) -> str:
         engines = ", ".join(run.engine for run in self.runs)
@@ -95,16 +104,18 @@ def compare_engines(
     settings: Mapping[str, Mapping[str, Any]] | None = None,
     samples: int = SAMPLES,
     contact_interval: float | None = None,
+    leave_out: bool = False,
     finish: Callable[[World], object] | None = None,
     progress: Callable[[str, float], object] | None = None,
 ) -> WorldComparison:
     """Run a scene for `duration` [s] in each engine, and compare the states at `samples` times.
 
     The engines step `dt` / `substeps`; `settings` are those of `World` by engine, and `contact_interval` [s]
-    is that of `World`, for the mean contact forces at the end. `finish` is called with
-    each world at its end, and `progress` with the name of the engine and the time reached. An engine that
-    fails in a step ends its run there. Raises the errors of `World` for a scene that cannot be opened, and
-    ComparisonInterrupted, with what is done, after Ctrl-C.
+    is that of `World`, for the mean contact forces at the end. With `leave_out` engines that refuse the scene
+    are left out, unless all do (`WorldComparison.left_out`). `finish` is called with each world at its end,
+    and `progress` with the name of the engine and the time reached. An engine that fails in a step ends its
+    run there. Raises the errors of `World` for a scene that cannot be opened, and ComparisonInterrupted, with
+    what is done, after Ctrl-C.
     """
     n_steps = max(1, round(positive_seconds("duration", duration) / positive_seconds("dt", dt)))
     ends = np.unique(np.linspace(0, n_steps, whole_number("samples", samples, 1) + 1).round().astype(int))
@@ -113,21 +124,19 @@ def compare_engines(
         raise ArgumentError(f"settings are given for {', '.join(sorted(unknown))}, which does not run")
     with ExitStack() as stack:
         # All are opened first, so that a scene that one engine refuses costs no time in the others.
-        worlds = [
-            stack.enter_context(
-                closing(
-                    World(
-                        scene,
-                        name,
-                        dt,
-                        substeps=substeps,
-                        contact_interval=contact_interval,
-                        **dict((settings or {}).get(name, {})),
-                    )
-                )
-            )
-            for name in engines
-        ]
+        worlds: list[World] = []
+        refusals: dict[str, UnsupportedFeatureError] = {}
+        options = {"substeps": substeps, "contact_interval": contact_interval}
+        for name in engines:
+            opened = _open(scene, name, dt, {**options, **(settings or {}).get(name, {})})
+            if isinstance(opened, World):
+                worlds.append(stack.enter_context(closing(opened)))
+            elif leave_out:
+                refusals[name] = opened
+            else:
+                raise opened
+        if refusals and not worlds:
+            raise [*refusals.values()][-1]
         runs: list[EngineRun] = []
         for world in worlds:
             summed = contact_interval is not None
@@ -136,12 +145,23 @@ def compare_engines(
                 break
     records = [_record(scene, run) for run in runs]
     separations = tuple(separation(a, b) for a, b in combinations(records, 2))
+    left_out = tuple(Refusal(name, str(error)) for name, error in refusals.items())
     comparison = WorldComparison(
-        scene, dt, substeps, n_steps * dt, tuple(runs), separations, contact_interval
+        scene, dt, substeps, n_steps * dt, tuple(runs), separations, contact_interval, left_out
     )
     if runs and runs[-1].interrupted:
         raise ComparisonInterrupted(comparison)
     return comparison
+
+
+def _open(
+    scene: Scene, engine: str, dt: float, options: Mapping[str, Any]
+) -> World | UnsupportedFeatureError:
+    """Return the world of an engine, or its refusal of the scene."""
+    try:
+        return World(scene, engine, dt, **options)
+    except UnsupportedFeatureError as error:
+        return error
 
 
 def _run(

@@ -248,15 +248,11 @@ def _joints_without_range(layout: Layout) -> list[str]:
 def beyond_limits(names: Sequence[str], q: Floats, lower: Floats, upper: Floats) -> list[str]:
     """Return the beginning of a sentence for each joint, at q (n,), that is beyond a limit."""
     return [
-        f"{shown(name)} is at {x:.4g}, beyond its limits {_range(low, high)}, at the start"
+        f"{shown(name)} is at {x:.4g}, beyond its limits "  # a ball joint has no lower one
+        f"{'up' if low == -np.inf else f'{low:.4g}'} to {high:.4g}, at the start"
         for name, x, low, high in zip(names, q, lower, upper, strict=True)
         if not low - LIMIT_EXCESS <= x <= high + LIMIT_EXCESS
     ]
-
-
-def _range(low: float, high: float) -> str:
-    """Return the words for a range; a ball joint has no lower limit."""
-    return f"up to {high:.4g}" if low == -np.inf else f"{low:.4g} to {high:.4g}"
 
 
 def joints_beyond_limits(layout: Layout, state: WorldState) -> list[str]:

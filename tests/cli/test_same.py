@@ -82,6 +82,22 @@ def test_a_mended_mjcf_file_is_not_named_urdf(changed: Path, tmp_path: Path) -> 
     assert run(first, tmp_path / "mended.xml").exit_code == 0
 
 
+def test_a_file_with_nothing_to_mend_is_said_not_to_be_written(tmp_path: Path) -> None:
+    out = tmp_path / "mended.xml"
+    text = dynx.load("ur5").to_mjcf()
+    first, second = tmp_path / "first.xml", tmp_path / "second.xml"
+    first.write_text(text)
+    sensor = '<sensor><jointpos name="angle" joint="elbow_joint"/></sensor>'
+    second.write_text(text.replace("</mujoco>", f"{sensor}</mujoco>"))
+    for other, said in ((second, "nothing to mend (other differences are not mended): "), (first, "mend: ")):
+        result = run(first, other, "--fix", out)
+        assert result.exit_code == 0
+        words = " ".join(result.output.split())
+        assert said in words
+        assert "is not written" in words
+        assert not out.exists()
+
+
 def test_directories_are_not_made(changed: Path, tmp_path: Path) -> None:
     result = run("ur5", changed, "--fix", tmp_path / "deep" / "mended.urdf")
     assert result.exit_code == 2

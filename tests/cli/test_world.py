@@ -322,3 +322,42 @@ def test_files_of_several_engines_or_bodies_are_not_written_through_links(tmp_pa
         result = run(str(scene), *words)
         assert (result.exit_code, "is a link" in result.output) == (2, True), result.output
     assert not (tmp_path / "other").exists()
+
+
+BALL_JOINT = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 0.1"/>
+<body name="rod" pos="0 0 1"><joint name="hip" type="ball" range="0 90" limited="true"/>
+<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.skipif(not {"pybullet", "mujoco"} <= {*ENGINES}, reason="needs PyBullet and MuJoCo")
+def test_engines_that_refuse_the_scene_are_left_out_unless_they_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "rod.xml"
+    path.write_text(BALL_JOINT)
+    result = run(str(path), "--duration", "0.01", "--json", "-")
+    assert result.exit_code == 0, result.output
+    report = json.loads(result.stdout)
+    assert [each["engine"] for each in report["engines"]] == ["mujoco"]
+    reasons = {each["engine"]: each["reason"] for each in report["left_out"]}
+    assert {"pybullet", "dynx"} <= {*reasons}
+    assert (
+        "a world on 'pybullet' does not take; the world engines 'mujoco' and 'dynx' do" in reasons["pybullet"]
+    )
+    assert "note: without pybullet: " in run(str(path), "--duration", "0.01").output
+    for named in ("pybullet", "mujoco,pybullet", "dynx"):
+        assert run(str(path), "--engine", named).exit_code == 2
+    # The advice of the engine `dynx` holds at the command line.
+    refused = run(str(path), "--engine", "dynx").stderr
+    assert "--set joint_limits=false" in " ".join(refused.split())
+    limits_off = ("--set", "joint_limits=false", "--duration", "0.01")
+    assert run(str(path), "--engine", "dynx", *limits_off).exit_code == 0
+
+
+def test_a_scene_that_every_engine_refuses_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dynx.cli.world.installed_worlds", lambda: ("dynx",))
+    path = tmp_path / "rod.xml"
+    path.write_text(BALL_JOINT)
+    result = run(str(path), "--duration", "0.01")
+    assert result.exit_code == 2
+    assert "joint limits and the ball joint 'hip'" in result.stderr

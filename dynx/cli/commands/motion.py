@@ -28,7 +28,12 @@ from dynx.errors import shown
 @click.argument("scene", metavar="SCENE")
 @group(
     "Run",
-    engines_option("Engines that run the scene"),
+    engine_option(
+        "engines",
+        "Engines that run the scene (default: all that are installed and do not refuse it).",
+        type=name_list,
+        metavar="A,B,C",
+    ),
     click.option(
         "--duration",
         type=FiniteRange(min=0.0, min_open=True),
@@ -50,7 +55,7 @@ from dynx.errors import shown
         show_default=True,
         help="Number of steps of the engine in each step.",
     ),
-    settings_option("Setting of an engine"),
+    settings_option("Setting of an engine, or joint_limits"),
     click.option(
         "--keyframe",
         metavar="NAME",
@@ -102,8 +107,11 @@ def world() -> None:
     The final states are printed, the contacts of the last step, and for every two engines how far apart
     their motions are over time. Notes name parts that overlap at the start, and constraints that it violates.
 
-    Exit code 0; 1 if an engine ended early or the engines are farther apart than --within; 2 for a scene
-    that cannot be run. After Ctrl-C the results so far are shown and written; the exit code is 130.
+    Without --engine, engines that refuse the scene are left out, with a note.
+
+    Exit code 0; 1 if an engine ended early or the engines are farther apart than --within; 2 for a scene that
+    cannot be run, or that an engine of --engine refuses. After Ctrl-C the results so far are shown and
+    written; the exit code is 130.
 
     \b
     Examples:

@@ -327,8 +327,8 @@ def _refuse_limited_ball_joints(robot: RobotLayout) -> None:
         ball = robot.model.ball_joints[0]
         raise UnsupportedFeatureError(
             f"the robot {shown(robot.name)} has joint limits and the ball joint {shown(ball.name)}, which "
-            "the engine 'dynx' does not have together with contacts and constraints; joint_limits=False "
-            "switches limits off"
+            "the engine 'dynx' does not have together with contacts and constraints; the engine 'mujoco' has "
+            "them, and joint_limits=False (in dynx world: --set joint_limits=false) switches limits off"
         )
 
 
