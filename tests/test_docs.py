@@ -19,6 +19,7 @@ from dynx.contacts import case_names
 from dynx.registry import DEFAULT_ENGINE
 from dynx.rules import all_rules
 from dynx.sim.scenario.options import OPTIONS
+from dynx.steppers.registry import world_class
 from dynx.world import World, read_scene
 from dynx.world.scene.documents import scene_from_document
 from tests.cli.contacts.documents import example
@@ -51,6 +52,14 @@ def test_every_rule_has_one_anchor_and_its_trap_is_linked(rules_page: str) -> No
     for rule in all_rules():
         assert rules_page.count(f'<a id="{rule.id.lower()}"></a>') == 1
         assert f"(../models/traps/{rule.trap()})" in rules_page
+
+
+@pytest.mark.skipif(DEFAULT_ENGINE != "pinocchio", reason="the table has the default of most machines")
+def test_the_defaults_of_dynxs_own_world_engine_are_those_of_the_page() -> None:
+    page = (DOCS / "reference/worlds.md").read_text(encoding="utf-8")
+    known = world_class("dynx").settings
+    for name in ("backend", "integrator"):
+        assert f"| `{name}` | `{known[name].default}` |" in page
 
 
 def test_the_cases_of_contacts_are_listed_and_have_results() -> None:
