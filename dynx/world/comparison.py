@@ -56,7 +56,7 @@ class EngineRun:
     """Mean force of each pair that touched in the last `contact_interval`, if that is given."""
 
 
-class Refusal(NamedTuple):
+class EngineRefusal(NamedTuple):
     """An engine that refuses a scene, and why."""
 
     engine: str
@@ -77,7 +77,7 @@ class WorldComparison:
     for each pair of engines (`Separation.records`)."""
     contact_interval: float | None = None
     """Interval [s] of `EngineRun.mean_contacts`; None where contacts were not summed."""
-    left_out: tuple[Refusal, ...] = ()
+    left_out: tuple[EngineRefusal, ...] = ()
     """Engines that refuse the scene and were left out."""
 
     def __repr__(self) -> str:
@@ -145,7 +145,7 @@ def compare_engines(
                 break
     records = [_record(scene, run) for run in runs]
     separations = tuple(separation(a, b) for a, b in combinations(records, 2))
-    left_out = tuple(Refusal(name, str(error)) for name, error in refusals.items())
+    left_out = tuple(EngineRefusal(name, str(error)) for name, error in refusals.items())
     comparison = WorldComparison(
         scene, dt, substeps, n_steps * dt, tuple(runs), separations, contact_interval, left_out
     )
