@@ -260,14 +260,11 @@ def test_exchanged_shapes_and_a_rigid_motion(
     assert tuple(each.swapped() for each in back) == here
     there = found(a, T_world @ T_a, b, T_world @ T_b, 0.02, 64)
     exact = distance(a, T_a, b, T_b)
-    if exact.lower <= 1e-6:
-        # The direction between shapes that overlap may be one of several.
-        assert min(p.gap for p in there) == pytest.approx(
-            min(p.gap for p in here), abs=1e-6 + exact.max_error
-        )
-        return
-    assert there[0].gap == pytest.approx(here[0].gap, abs=1e-6)
-    assert_allclose(there[0].normal, T_world[:3, :3] @ here[0].normal, atol=1e-5)
+    least, least_there = (min(point.gap for point in points) for points in (here, there))
+    assert least_there == pytest.approx(least, abs=1e-6 + exact.max_error)
+    # The direction between shapes that overlap may be one of several.
+    if exact.lower > 1e-6:
+        assert_allclose(there[0].normal, T_world[:3, :3] @ here[0].normal, atol=1e-5)
 
 
 @settings(max_examples=60)
