@@ -19,12 +19,12 @@ from dynx.spatial.scalar import Floats
 class _Configurations(dict[str, Floats]):
     """Configurations of a robot, with an error that lists the names."""
 
-    def __init__(self, robot: str) -> None:
+    def __init__(self, robot: str, nq: int) -> None:
         super().__init__()
-        self._robot = robot
+        self._robot, self._none = robot, f"; its description has none; wanted {nq} numbers"
 
     def __missing__(self, name: object) -> Floats:
-        known = f"; it has {', '.join(map(shown, list(self)[:8]))}" if self else "; its description has none"
+        known = f"; it has {', '.join(map(shown, list(self)[:8]))}" if self else self._none
         near = nearest(name, self) if isinstance(name, str) else ""
         raise UnknownNameError(f"no configuration {shown(name)} of {self._robot}{near or known}")
 
@@ -34,7 +34,7 @@ def named_configurations(tree: Tree) -> Mapping[str, Floats]:
 
     Raises UnknownNameError for a position of a joint that the robot has not.
     """
-    found = _Configurations(tree.name)
+    found = _Configurations(tree.name, tree.nq)
     for each in tree.stated_configurations or ():
         found[each.name] = coordinates_of(tree, each)
         found[each.name].setflags(write=False)

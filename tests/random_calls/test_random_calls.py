@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import dynx
+import dynx.doctor
 from dynx import trajectory
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DTypeError

@@ -104,7 +104,7 @@ def _named_configuration(model: Model, name: str, option: str) -> Floats:
                 remark(str(note))
         return q
     except UnknownNameError as error:
-        hint = "" if model.configurations else "; wanted numbers, such as 0,1.5,... or joint=value,..."
+        hint = "" if model.configurations else ", such as 0,1.5,... or joint=value,..."
         raise UnknownNameError(f"{option}: {error}{hint}") from error
 
 

@@ -649,7 +649,7 @@ def test_data_of_the_file_is_counted_and_named(tmp_path: Path) -> None:
     ("robot", "q", "message"),
     [
         ("arm.xml", "hom", "--q: no configuration 'hom' of arm; did you mean 'home'"),
-        ("ur5", "home", "its description has none; wanted numbers"),
+        ("ur5", "home", "its description has none; wanted 6 numbers, such as"),
         ("ur5", "nan", "'nan' is not finite"),
         ("ur5", "1;2", "'1;2' is not a number"),
         ("arm.xml", "j=0.7,hom", "'hom' among the values is no joint=value; wanted 0,1.5,... or joint="),
