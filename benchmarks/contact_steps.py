@@ -77,14 +77,19 @@ def trot(step: int, n: int) -> Floats:
 MOTIONS: dict[str, Targets] = {"standing": standing, "random targets": random_targets, "trot": trot}
 
 
+def initial_configurations(model: Model, n: int) -> Floats:
+    """Return the configurations (n, nq) in which the robots begin."""
+    q = np.tile(model.neutral(), (n, 1))
+    q[:, 2] = HEIGHT
+    q[:, 7:] = STANCE + np.random.default_rng(1).uniform(-0.05, 0.05, (n, 12))
+    return q
+
+
 class Robots:
     """A batch of robots on the kernel of dynx."""
 
     def __init__(self, model: Model, kernel: Kernel, n: int) -> None:
-        q = np.tile(model.neutral(), (n, 1))
-        q[:, 2] = HEIGHT
-        q[:, 7:] = STANCE + np.random.default_rng(1).uniform(-0.05, 0.05, (n, 12))
-        self.state = [q, np.zeros((n, model.nv)), np.zeros((n, 3 * len(FEET)))]
+        self.state = [initial_configurations(model, n), np.zeros((n, model.nv)), np.zeros((n, 3 * len(FEET)))]
         self._next = [each.copy() for each in self.state]
         self.residual = np.zeros((n, 1))
         self._kernel = kernel
@@ -136,7 +141,7 @@ class MujocoRobots:
         self.model = mujoco_model(model)
         self.data = mujoco.MjData(self.model)
         kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
-        q = Robots(model, None, n).state[0]  # type: ignore[arg-type]
+        q = initial_configurations(model, n)
         self.state = np.zeros((n, mujoco.mj_stateSize(self.model, kind)))
         for k in range(n):
             self.data.qpos[:3] = q[k, :3]

@@ -66,7 +66,7 @@ class FrameCoordinates:
         self.count = len(self._turning) + len(in_v)
         """Number of coordinates; 0 if nothing moves the frame."""
         self.relative = bool(self._turning)
-        """Whether some coordinates count from the current configuration: those of quaternions."""
+        """True if some coordinates count from the current configuration: those of quaternions."""
 
         self._low, self._high = model.lower[self._in_q], model.upper[self._in_q]
         if margin is not None:

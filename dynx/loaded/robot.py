@@ -102,7 +102,7 @@ class EngineCoordinates:
     joints_v: tuple[int, ...]
     """Index in v of each coordinate of the joints, in the order of `Model.coordinate_names`."""
     circles: tuple[bool, ...]
-    """Whether q has the cosine and sine of the angle, for each position of the joints."""
+    """True for each position of the joints whose angle q states by cosine and sine."""
     base: EngineBase | None = None
 
 

@@ -152,7 +152,7 @@ def contact_step(
             gap = gaps[i // 3]
             terms.append(maximum(gap / h, maximum(gap * (RECOVERY / h), -MAX_RECOVERY_SPEED)))
         c.append(sum(terms[1:], terms[0]))
-    impulses, residual = _solved(spheres, sweeps, eliminated, _objects(c), impulses, repeat)
+    impulses, residual = _contact_impulses(spheres, sweeps, eliminated, _objects(c), impulses, repeat)
     for solved_row, impulse in zip(eliminated.Z, impulses, strict=True):
         for k, each in solved_row.items():
             u[k] = u[k] + each * impulse
@@ -220,7 +220,7 @@ def _in_fixed_axes(mechanism: Mechanism, v: Array, h: float) -> Array:
     return np.concatenate([v[:3] + h * turned, v[3:]])
 
 
-def _solved(
+def _contact_impulses(
     spheres: SpheresOnPlane,
     sweeps: Sweeps,
     eliminated: EliminatedRows,

@@ -32,9 +32,9 @@ ISOLATED = 1e-4
 
 @dataclass
 class _Features:
-    """What is fixed to a robot at its zero positions, in the frame of its root, keyed alike in both robots:
-    joint axes and principal axes, which have no sign, directions with one, and places with what of a shift
-    (3, 3) they determine."""
+    """Axes and places of a robot at its zero positions, in the frame of its root, with the same keys in both
+    robots: joint axes and principal axes, which have no sign; directions with a sign; and places, each with
+    the projection (3, 3) onto the shifts that it determines."""
 
     axes: dict[object, Floats] = field(default_factory=dict)
     principal: dict[object, Floats] = field(default_factory=dict)

@@ -141,7 +141,7 @@ def coupled_as(equality: StatedEquality) -> tuple[str, str, float, float] | None
 
 
 class _Constraints:
-    """What the constraints of two robots hold, in the terms of the first one."""
+    """Parts and numbers of the constraints of two robots, in names and axes of the first robot."""
 
     def __init__(self, ours: Model, theirs: Model, found: Fit, tolerance: float) -> None:
         self._found, self._tolerance = found, tolerance

@@ -96,7 +96,7 @@ class JointStops:
             v[in_v],
             *(bound[in_q - self._q_joints.start] for bound in (self._lower, self._upper)),
         )
-        turned = balls.held(before, q)
+        turned = balls.stopped(before, q)
         if not turned and (held == q[in_q]).all():
             return None
         q = q.copy()
@@ -138,7 +138,7 @@ class _BallStops:
             if joint.limits.upper < math.pi
         ]
 
-    def held(self, before: Floats, q: Floats) -> list[tuple[int, int, Floats, float]]:
+    def stopped(self, before: Floats, q: Floats) -> list[tuple[int, int, Floats, float]]:
         """Return the ball joints that passed their largest angle in a step: index in q, index in v, axis (3,)
         of the rotation, and angle at which it stops."""
         found = []

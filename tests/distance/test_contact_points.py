@@ -41,7 +41,7 @@ def _quat(angle: float, axis: int) -> Floats:
     return quat
 
 
-def found(
+def points_of(
     a: Shape | Hull, T_a: Floats, b: Shape | Hull, T_b: Floats = HERE, within: float = 0.01, limit: int = 4
 ) -> tuple[ContactPoint, ...]:
     return contact_points(PlacedSolid(a, T_a), PlacedSolid(b, T_b), within, limit)
@@ -65,7 +65,7 @@ def size_of(*shapes: ConvexShape) -> float:
 @pytest.mark.parametrize("ground", [Plane(), BIG, Hull(CORNERS.points * [4.0, 4.0, 1.0])])
 def test_a_box_rests_on_its_four_corners(shape: Shape | Hull, ground: Shape | Hull, tilt: float) -> None:
     top = 0.0 if isinstance(ground, Plane) else 0.5
-    points = found(shape, pose((0.0, 0.0, top + 0.499), 0.0, tilt), ground)
+    points = points_of(shape, pose((0.0, 0.0, top + 0.499), 0.0, tilt), ground)
     s = 0.5
     assert len({each.feature for each in points}) == 4
     got = np.array(sorted(tuple(np.round(each.point_a, 3) + 0.0) for each in points))
@@ -78,7 +78,7 @@ def test_a_box_rests_on_its_four_corners(shape: Shape | Hull, ground: Shape | Hu
 
 def test_corners_and_features_stay_when_a_box_tips() -> None:
     features = {
-        frozenset(each.feature for each in found(CUBE, pose((0.0, 0.0, z), 0.3, tilt), ground))
+        frozenset(each.feature for each in points_of(CUBE, pose((0.0, 0.0, z), 0.3, tilt), ground))
         for tilt in (0.0, 1e-9, -1e-9, 1e-5, -1e-5)
         for z, ground in ((0.999, CUBE), (0.499, Plane()))
     }
@@ -90,7 +90,7 @@ def test_corners_and_features_stay_when_a_box_tips() -> None:
 def test_a_box_turned_on_a_box_has_four_of_the_octagon(
     shapes: tuple[Shape | Hull, Shape | Hull], gap: float
 ) -> None:
-    points = found(shapes[0], pose((0.0, 0.0, 1.0 + gap), np.pi / 4), shapes[1])
+    points = points_of(shapes[0], pose((0.0, 0.0, 1.0 + gap), np.pi / 4), shapes[1])
     corner = 0.5 * (np.sqrt(2.0) - 1.0)
     octagon = {(x, y) for a in (-0.5, 0.5) for b in (-corner, corner) for x, y in ((a, b), (b, a))}
     got = {tuple(p[:2]) for p in places(points)}
@@ -109,15 +109,15 @@ def by_angle(points: tuple[ContactPoint, ...]) -> list[tuple[float, ...]]:
 
 
 def test_a_box_over_the_edge_of_a_box() -> None:
-    points = found(CUBE, pose((0.6, 0.2, 1.0)), CUBE)
+    points = points_of(CUBE, pose((0.6, 0.2, 1.0)), CUBE)
     assert places(points) == [(0.1, -0.3, 0.5), (0.1, 0.5, 0.5), (0.5, -0.3, 0.5), (0.5, 0.5, 0.5)]
 
 
 def test_an_edge_on_a_face_and_two_crossing_edges() -> None:
     low = 0.5 * np.sqrt(2.0)
-    points = found(CUBE, pose((0.0, 0.0, 0.5 + low), 0.0, np.pi / 4), BIG)
+    points = points_of(CUBE, pose((0.0, 0.0, 0.5 + low), 0.0, np.pi / 4), BIG)
     assert places(points) == [(-0.5, 0.0, 0.5), (0.5, 0.0, 0.5)]
-    (crossing,) = found(
+    (crossing,) = points_of(
         CUBE, pose((0.1, 0.2, 2.0 * low), 0.0, np.pi / 4), CUBE, pose((0.0, 0.0, 0.0), np.pi / 2, np.pi / 4)
     )
     assert_allclose(crossing.point_a, (0.0, 0.2, low), atol=1e-12)
@@ -127,12 +127,12 @@ def test_an_edge_on_a_face_and_two_crossing_edges() -> None:
 @pytest.mark.parametrize("ground", [Plane(), BIG, Hull(CORNERS.points * [4.0, 4.0, 1.0])])
 def test_a_capsule_lies_on_its_ends(ground: Shape | Hull) -> None:
     top = 0.0 if isinstance(ground, Plane) else 0.5
-    points = found(Capsule(0.1, 1.0), pose((0.1, 0.0, top + 0.1), 0.0, np.pi / 2), ground)
+    points = points_of(Capsule(0.1, 1.0), pose((0.1, 0.0, top + 0.1), 0.0, np.pi / 2), ground)
     assert_allclose(places(points), [(0.1, -0.5, top), (0.1, 0.5, top)], atol=1e-9)
 
 
 def test_a_capsule_longer_than_the_box_below() -> None:
-    points = found(Capsule(0.1, 3.0), pose((0.1, 0.0, 0.6), 0.0, np.pi / 2), CUBE)
+    points = points_of(Capsule(0.1, 3.0), pose((0.1, 0.0, 0.6), 0.0, np.pi / 2), CUBE)
     assert_allclose(places(points), [(0.1, -0.5, 0.5), (0.1, 0.5, 0.5)], atol=1e-9)
 
 
@@ -143,7 +143,7 @@ def test_a_cylinder_stands_on_four_points_of_its_rim(ground: Shape | Hull, tilt:
     lowest point of the rim is not one of the four."""
     top = 0.0 if isinstance(ground, Plane) else 0.5
     lowest = 0.5 * np.cos(tilt) + 0.3 * abs(np.sin(tilt))
-    points = found(Cylinder(0.3, 1.0), pose((0.0, 0.0, top + lowest - 1e-4), 0.7, tilt), ground)
+    points = points_of(Cylinder(0.3, 1.0), pose((0.0, 0.0, top + lowest - 1e-4), 0.7, tilt), ground)
     assert len(points) == 4
     assert min(each.gap for each in points) == pytest.approx(-1e-4, abs=2.0 * TIE)
     assert_allclose([np.hypot(p[0], p[1]) for p in places(points)], 0.3, atol=1e-3)
@@ -162,18 +162,20 @@ def _support_distance(points: tuple[ContactPoint, ...]) -> list[float]:
 @pytest.mark.parametrize("ground", [Plane(), BIG])
 def test_a_cylinder_lies_on_the_two_ends_of_a_line(ground: Shape) -> None:
     top = 0.0 if isinstance(ground, Plane) else 0.5
-    points = found(Cylinder(0.3, 1.0), pose((0.0, 0.0, top + 0.3), 0.0, np.pi / 2 + 1e-7), ground)
+    points = points_of(Cylinder(0.3, 1.0), pose((0.0, 0.0, top + 0.3), 0.0, np.pi / 2 + 1e-7), ground)
     assert_allclose(places(points), [(0.0, -0.5, top), (0.0, 0.5, top)], atol=1e-6)
 
 
 def test_parallel_cylinders_and_capsules_touch_along_a_line() -> None:
     for a, b in ((Cylinder, Cylinder), (Capsule, Capsule), (Cylinder, Capsule)):
-        points = found(a(0.3, 1.0), pose((0.0, 0.0, 0.0)), b(0.2, 1.5), pose((0.5, 0.0, 0.4)))
+        points = points_of(a(0.3, 1.0), pose((0.0, 0.0, 0.0)), b(0.2, 1.5), pose((0.5, 0.0, 0.4)))
         assert_allclose(places(points), [(0.3, 0.0, -0.35), (0.3, 0.0, 0.5)], atol=1e-9)
 
 
 def test_crossed_capsules_touch_at_one_point() -> None:
-    (point,) = found(Capsule(0.1, 1.0), pose((0.2, 0.1, 0.2), 0.0, np.pi / 2), Capsule(0.1, 1.0), _along_x())
+    (point,) = points_of(
+        Capsule(0.1, 1.0), pose((0.2, 0.1, 0.2), 0.0, np.pi / 2), Capsule(0.1, 1.0), _along_x()
+    )
     assert_allclose(point.point_a, (0.2, 0.0, 0.1), atol=1e-12)
 
 
@@ -182,18 +184,18 @@ def _along_x() -> Floats:
 
 
 def test_balls() -> None:
-    (point,) = found(Sphere(0.2), pose((0.3, 0.0, 0.0)), Sphere(0.11))
+    (point,) = points_of(Sphere(0.2), pose((0.3, 0.0, 0.0)), Sphere(0.11))
     assert_allclose(point.point_a, (0.1, 0.0, 0.0), atol=1e-15)
     assert_allclose(point.point_b, (0.11, 0.0, 0.0), atol=1e-15)
     assert point.gap == pytest.approx(-0.01)
-    assert found(Sphere(0.2), pose((0.33, 0.0, 0.0)), Sphere(0.11)) == ()
+    assert points_of(Sphere(0.2), pose((0.33, 0.0, 0.0)), Sphere(0.11)) == ()
 
 
 def test_two_grounds_and_a_limit_below_one_are_refused() -> None:
     with pytest.raises(ArgumentError, match="grounds"):
-        found(Plane(), HERE, Plane())
+        points_of(Plane(), HERE, Plane())
     with pytest.raises(ArgumentError, match="limit is 0"):
-        found(CUBE, HERE, Plane(), limit=0)
+        points_of(CUBE, HERE, Plane(), limit=0)
 
 
 # -- what holds for every pair --
@@ -223,7 +225,7 @@ def test_the_least_gap_is_the_distance(
 ) -> None:
     a, T_a, b, T_b = pair
     exact = distance(a, T_a, b, T_b)
-    points = found(a, T_a, b, T_b, 0.02, limit)
+    points = points_of(a, T_a, b, T_b, 0.02, limit)
     assert 1 <= len(points) <= limit
     size = size_of(a, b)
     least = min(each.gap for each in points)
@@ -255,10 +257,10 @@ def test_exchanged_shapes_and_a_rigid_motion(
     pair: tuple[ConvexShape, Floats, ConvexShape, Floats], T_world: Floats
 ) -> None:
     a, T_a, b, T_b = pair
-    here = found(a, T_a, b, T_b, 0.02, 64)
-    back = found(b, T_b, a, T_a, 0.02, 64)
+    here = points_of(a, T_a, b, T_b, 0.02, 64)
+    back = points_of(b, T_b, a, T_a, 0.02, 64)
     assert tuple(each.swapped() for each in back) == here
-    there = found(a, T_world @ T_a, b, T_world @ T_b, 0.02, 64)
+    there = points_of(a, T_world @ T_a, b, T_world @ T_b, 0.02, 64)
     exact = distance(a, T_a, b, T_b)
     least, least_there = (min(point.gap for point in points) for points in (here, there))
     assert least_there == pytest.approx(least, abs=1e-6 + exact.max_error)
@@ -279,8 +281,8 @@ def test_a_small_motion_moves_points_little(
     moved[:3, 3] += step * np.array(direction[:3])
     quat = np.array([*(0.5 * step * x for x in direction[3:]), 1.0])
     moved[:3, :3] = rotation_from_quat(quat / np.linalg.norm(quat)) @ moved[:3, :3]
-    before = {each.feature: each for each in found(a, T_a, b, T_b, 0.02)}
-    after = {each.feature: each for each in found(a, moved, b, T_b, 0.02)}
+    before = {each.feature: each for each in points_of(a, T_a, b, T_b, 0.02)}
+    after = {each.feature: each for each in points_of(a, moved, b, T_b, 0.02)}
     least = min(each.gap for each in before.values()), min(each.gap for each in after.values())
     size = size_of(a, b)
     assert least[1] == pytest.approx(least[0], abs=4.0 * step * size + 4.0 * TIE * size + exact.max_error)
@@ -300,7 +302,7 @@ def test_planes(kind: str) -> None:
         shape, T, T_plane = random_shape(rng, kind), random_pose(rng, 1.0), random_pose(rng, 1.0)
         start = distance(shape, T, Plane(), T_plane)
         T[:3, 3] += (rng.choice([-0.01, 0.0, 0.01]) - start.distance) * start.normal
-        points = found(shape, T, Plane(), T_plane, 0.05)
+        points = points_of(shape, T, Plane(), T_plane, 0.05)
         exact = distance(shape, T, Plane(), T_plane).distance
         size = size_of(shape)
         assert min(each.gap for each in points) == pytest.approx(exact, abs=2.0 * TIE * size)
@@ -308,7 +310,7 @@ def test_planes(kind: str) -> None:
             assert_allclose(each.normal, T_plane[:3, 2], atol=ROUNDING)
             assert T_plane[:3, 2] @ (each.point_b - T_plane[:3, 3]) == pytest.approx(0.0, abs=ROUNDING)
             check_on_surface(shape, T, np.array(each.point_a), size)
-        back = found(Plane(), T_plane, shape, T, 0.05)
+        back = points_of(Plane(), T_plane, shape, T, 0.05)
         assert tuple(each.swapped() for each in back) == points
 
 
@@ -322,7 +324,7 @@ def test_no_gap_jumps_as_a_shape_tips_over(shape: ConvexShape) -> None:
         for angle in angles:
             T = pose((0.0, 0.0, 0.0), 0.2, angle)
             T[2, 3] = 0.5 * (ground is BIG) + support(shape, T, (0.0, 0.0, -1.0))[0] - 0.01
-            points = found(shape, T, ground, within=0.5)
+            points = points_of(shape, T, ground, within=0.5)
             least = min(each.gap for each in points)
             assert last is None or least == pytest.approx(last, abs=1e-8)
             last = least

@@ -48,8 +48,8 @@ STUCK = 1e-9
 """Velocity [rad/s or m/s] of a joint that sticks by dry friction, which is rounding."""
 
 Key = tuple[int, int, int, int, int]
-"""What an impulse belongs to: its kind, then two shapes and their features, or part, joint and side, or
-number of the constraint, and zeros."""
+"""Origin of an impulse: its kind, then two shapes and their features, or part, joint and side, or the number
+of the constraint, and zeros."""
 
 CONTACT, LIMIT, DRY, CONSTRAINT = range(4)
 """Kinds of keys."""

@@ -48,9 +48,9 @@ COINCIDENCE = 1e-9
 
 @dataclass(frozen=True)
 class EqualityObjects:
-    """What the constraints of a robot may couple: links by names of bodies, frames by names of sites, and the
-    positions of joints and lengths of tendons in the pose of the file. `poses` are those (4, 4) of the links
-    in the world."""
+    """Parts of a robot that constraints may couple: links by names of bodies, frames by names of sites, and
+    the positions of joints and lengths of tendons in the pose of the file. `poses` are those (4, 4) of the
+    links in the world."""
 
     links: Mapping[str, str]
     sites: Mapping[str, str]
@@ -183,7 +183,7 @@ def _poses_of_bodies(
     if element.tag == "connect":
         anchor = np.array(reading.vector(element, "anchor", what))
         in_second = inverse(T_world[1]) @ T_world[0] @ homogeneous(np.eye(3), anchor)
-        return _at(anchor), _at(in_second[:3, 3])
+        return _unrotated_pose(anchor), _unrotated_pose(in_second[:3, 3])
     anchor = np.array(reading.vector(element, "anchor", what) if "anchor" in given else (0.0, 0.0, 0.0))
     relative = np.array(reading.numbers(element, "relpose", what, 7)) if "relpose" in given else np.zeros(7)
     if relative[3:].any():
@@ -191,10 +191,10 @@ def _poses_of_bodies(
         in_first = homogeneous(rotation_from_quat(np.array([x, y, z, w])), relative[:3])
     else:
         in_first = inverse(T_world[0]) @ T_world[1] @ homogeneous(np.eye(3), anchor)
-    return Pose.from_matrix(in_first), _at(anchor)
+    return Pose.from_matrix(in_first), _unrotated_pose(anchor)
 
 
-def _at(point: Floats) -> Pose:
+def _unrotated_pose(point: Floats) -> Pose:
     x, y, z = point.tolist()
     return Pose((x, y, z))
 
