@@ -6,14 +6,14 @@ The format is that of MuJoCo 4.0 (https://mujoco.readthedocs.io, XML reference).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
-from dynx.errors import nearest, shown
+from dynx.errors import escaped, nearest, shown
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh, reason_unknown
 from dynx.model.mjcf.options import MjcfOptions
 from dynx.model.topology import MAX_LINKS
@@ -220,6 +220,28 @@ class MjcfText:
         """Yield the content of all sections of that tag."""
         for section in self.root.all(tag):
             yield from section.children
+
+    def named_elements(self, section: str, tags: Collection[str], what: str) -> Iterator[Element]:
+        """Yield the content of all sections of that tag, whose elements have `tags` and different names.
+
+        Raises DescriptionError for another tag, and for a name that two of them have. `what` is what an
+        element is called, for messages.
+        """
+        names = set[str]()
+        for element in self.sections(section):
+            tag, name = element.tag, element.attributes.get("name", "")
+            if tag not in tags:
+                raise self.reading.error(
+                    element, f"<{section}> has the unknown element <{escaped(tag)}>{nearest(tag, tags)}"
+                )
+            if not name:
+                yield element
+                continue
+            self.reading.name(element, "name", f"a{'n' if what[0] in 'aeiou' else ''} {what}")
+            if name in names:
+                raise self.reading.error(element, f"two {what}s have the name {shown(name)}")
+            names.add(name)
+            yield element
 
     def resolved(self, element: Element, childclass: str | None, tag: str | None = None) -> Element:
         """Return an element with the attributes that it has from its class of defaults.

@@ -14,7 +14,7 @@ from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
-from dynx.errors import escaped, nearest, shown
+from dynx.errors import nearest, shown
 from dynx.model.elements import IDENTITY, Pose
 from dynx.model.equalities import LINEAR, Polynomial, StatedEquality
 from dynx.model.mjcf.attributes import quat_wxyz, text
@@ -76,21 +76,11 @@ def read_equalities(
     Those that dynx wrote for mimic joints are neither. Raises DescriptionError for a malformed constraint,
     and for one of a part that the file does not have, as MuJoCo does.
     """
-    reading, taken, left, names = document.reading, [], [], set[str]()
-    elements = list(document.sections("equality"))
+    taken, left = [], []
+    elements = list(document.named_elements("equality", (*_ENDS, *_NOT_TAKEN), "constraint"))
     known = names_by_kind(document) if elements else {}
     for element in elements:
-        tag, name = element.tag, element.attributes.get("name", "")
-        if tag not in _ENDS and tag not in _NOT_TAKEN:
-            raise reading.error(
-                element,
-                f"<equality> has the unknown element <{escaped(tag)}>{nearest(tag, (*_ENDS, *_NOT_TAKEN))}",
-            )
-        if name:
-            reading.name(element, "name", "a constraint")
-        if name in names:
-            raise reading.error(element, f"two constraints have the name {shown(name)}")
-        names |= {name} if name else set()
+        tag = element.tag
         if is_mimic(element):
             continue
         if tag in _NOT_TAKEN:

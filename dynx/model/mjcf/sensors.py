@@ -105,23 +105,10 @@ def _renamed(kind: str, name: str, links: Mapping[str, str], sites: Mapping[str,
 
 def _sensors(document: MjcfText) -> Iterator[tuple[Element, StatedSensor | None, str]]:
     """Yield the elements with what they state, or why that is not taken."""
-    elements = list(document.sections("sensor"))
-    if not elements:
-        return
-    known, names, reading = names_by_kind(document), set[str](), document.reading
+    elements = list(document.named_elements("sensor", (*_SLOTS, *_NOT_TAKEN), "sensor"))
+    known = names_by_kind(document) if elements else {}
     for element in elements:
-        tag, name = element.tag, element.attributes.get("name", "")
-        if tag not in _SLOTS and tag not in _NOT_TAKEN:
-            raise reading.error(
-                element,
-                f"<sensor> has the unknown element <{escaped(tag)}>{nearest(tag, (*_SLOTS, *_NOT_TAKEN))}",
-            )
-        if name:
-            reading.name(element, "name", "a sensor")
-        if name in names:
-            raise reading.error(element, f"two sensors have the name {shown(name)}")
-        names |= {name} if name else set()
-        if tag in _NOT_TAKEN:
+        if element.tag in _NOT_TAKEN:
             yield element, None, "is of a type that is not read"
             continue
         yield (element, *_read(document, element, known))

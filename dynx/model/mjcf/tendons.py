@@ -31,22 +31,9 @@ def read_tendons(
     does.
     """
     taken, left = [], []
-    reading, names = document.reading, set[str]()
-    elements = list(document.sections("tendon"))
+    elements = list(document.named_elements("tendon", ("fixed", "spatial"), "tendon"))
     known = names_by_kind(document)["joint"] if elements else set()
     for element in elements:
-        name = element.attributes.get("name", "")
-        if element.tag not in ("fixed", "spatial"):
-            raise reading.error(
-                element,
-                f"<tendon> has the unknown element <{escaped(element.tag)}>"
-                f"{nearest(element.tag, ('fixed', 'spatial'))}",
-            )
-        if name:
-            reading.name(element, "name", "a tendon")
-        if name in names:
-            raise reading.error(element, f"two tendons have the name {shown(name)}")
-        names |= {name} if name else set()
         if element.tag == "spatial":
             left.append((element, "<spatial> runs along sites and geoms"))
             continue
