@@ -1,17 +1,18 @@
-"""A traced function with a loop inside: code before it, a step that is repeated, and code after it.
+"""A traced function with loops inside: code, a step that is repeated, code, perhaps another loop, and code.
 
 The function receives `repeat`, which repeats a step on arrays of symbols as often as a state says that it
-goes on. All three parts become one kernel. Values that the step or the code after it need are kept in memory,
-a vector each, so that neither code nor time of compilation grows with the number of repetitions.
+goes on. All parts become one kernel. Values that later parts need are kept in memory, a vector each, so that
+neither code nor time of compilation grows with the number of repetitions.
 
 A lane whose loop has ended keeps its state whatever other lanes do. So its results depend neither on the
-other lanes nor on their number. The loop of a vector ends when those of all its lanes have ended.
+other lanes nor on their number. The loop of a vector ends when those of all its lanes have ended; where none
+of them begins, it takes only the time of that test.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -42,11 +43,11 @@ from dynx.spatial.scalar import Array, select
 GOES_ON = "goes_on"
 """Entry (1,) of the state that is 0 where the loop has ended."""
 
-KEPT = "kept"
-"""Name of the port of values from before the loop that the step or the code after it needs."""
+_KEPT = "kept."
+"""Beginning of the names of ports of values that later parts need."""
 
 _STATE = "state."
-"""Beginning of the names of ports of the state, since arrays of the caller may have the same names."""
+"""Beginning of the names of ports of the states, since arrays of the caller may have the same names."""
 
 SEGMENT = 12_000
 """Length of the segments (`dynx.simd.emit`). A long one takes a tenth more time to compile than short ones,
@@ -56,29 +57,31 @@ RELOADED_AFTER = 100
 """Lines of code after which a value that is kept in memory is read from there again. The compiler would keep
 it on the stack as well, and both together exceed the first-level cache."""
 
+_LEAKS = "code outside of a loop uses what a step of the loop computed, beside the state"
+
 Numbers = dict[str, Array]
 Step = Callable[[Numbers], Numbers]
 
 
 @dataclass(frozen=True)
 class Repetition:
-    """The three parts of a function with a loop."""
+    """The parts of a function with loops."""
 
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
-    before: Program
-    """From the inputs to the first state and the kept values."""
-    step: Program
-    """From the state and the kept values to the next state."""
-    after: Program
-    """From the inputs, the last state and the kept values to the outputs."""
-    most: int
-    """Largest number of repetitions."""
+    codes: tuple[Program, ...]
+    """Code before the first loop, between loops, and after the last one. Each but the last computes the first
+    state of the next loop, and values that later parts need."""
+    steps: tuple[Program, ...]
+    """For each loop the step from its state, and from what was computed before, to the next state."""
+    most: tuple[int, ...]
+    """Largest number of repetitions of each loop."""
 
     @property
-    def parts(self) -> tuple[Program, Program, Program]:
-        """The three parts in order."""
-        return self.before, self.step, self.after
+    def parts(self) -> tuple[Program, ...]:
+        """All parts in order: code, then a step and code for each loop."""
+        pairs = zip(self.steps, self.codes[1:], strict=True)
+        return self.codes[0], *(part for pair in pairs for part in pair)
 
 
 def trace_repetition(
@@ -89,109 +92,187 @@ def trace_repetition(
 ) -> Repetition:
     """Trace ``function(repeat=repeat, **arrays)``, which returns a mapping from output names to arrays.
 
-    It calls ``repeat(step, state, most)`` once, which returns the last state. ``step(state)`` returns the
-    next state, arrays by the same names; it may also use whatever was computed before. What it computes
-    without the state is computed once. The loop ends after `most` steps, or where ``goes_on`` (1,) of the
+    It calls ``repeat(step, state, most)`` for each loop, which returns the last state. ``step(state)``
+    returns the next state, arrays by the same names; it may also use whatever was computed before. What it
+    computes without the state is computed once. The loop ends after `most` steps, or where ``goes_on`` (1,) of the
     state is 0. Raises TraceError as `trace` does, or if the function does not keep to this.
     """
     with collection_paused():
         return _Tracer(inputs, simplify).repetition(function)
 
 
+@dataclass
+class _Loop:
+    """A loop in the trace."""
+
+    state: list[Port]
+    in_loop: range
+    """Slots of the state in the loop."""
+    last: range
+    """Slots of the last state."""
+    first_state: list[int]
+    """Nodes of the first state."""
+    most: int
+    next_state: list[int] = field(default_factory=list)
+    """Nodes of the next state."""
+
+
 class _Tracer:
     """Trace of all parts in one graph, which is then divided.
 
-    Behind the inputs of the function follow those of the state in the loop, and those of the last state.
+    Behind the inputs of the function follow, for each loop, those of the state in it, and those of the last
+    state.
     """
 
     def __init__(self, inputs: Mapping[str, tuple[int, ...]], simplify: Simplify | None) -> None:
         self._graph = Graph(simplify)
         self._ports = [Port(name, tuple(shape)) for name, shape in inputs.items()]
-        self._size = sum(port.size for port in self._ports)
+        self._size = self._slots = sum(port.size for port in self._ports)
         self._arguments = {
             port.name: symbols(self._graph, port, slots.start) for port, slots in scalar_ranges(self._ports)
         }
-        self._states: list[Port] = []
-        self._first: list[int] = []
-        """Nodes of the first state."""
-        self._next: list[int] = []
-        """Nodes of the next state."""
-        self._most = 0
+        self._loops: list[_Loop] = []
+        self._is_open = False
 
     def repetition(self, function: Callable[..., Mapping[str, Array]]) -> Repetition:
         """Return the trace of a function."""
         outputs, results = self._entries(function(repeat=self._repeat, **self._arguments))
-        if not self._states:
+        loops = self._loops
+        if not loops:
             raise TraceError("the traced function repeats nothing")
-        size = sum(port.size for port in self._states)
-        in_loop = self._dependent(range(self._size, self._size + size))
-        late = self._dependent(range(self._size + size, self._size + 2 * size))
-        if any(in_loop[index] for index in results) or any(map(all, zip(in_loop, late, strict=True))):
-            raise TraceError("code after a loop uses what a step of the loop computed, beside the state")
-        kept = sorted(
-            self._needed(self._next, in_loop, inputs=True) | self._needed(results, late, inputs=False)
+        stages, inside = self._stages()
+        # Results of each code, without the values it keeps, and of each step.
+        wanted = [*(loop.first_state for loop in loops), results]
+        if any(inside[index] for nodes in wanted for index in nodes):
+            raise TraceError(_LEAKS)
+        kept: list[set[int]] = [set() for _ in loops]
+        for number, loop in enumerate(loops, 1):
+            own = [each == number for each in inside]
+            for index in self._needed(loop.next_state, own, inputs=True):
+                kept[stages[index]].add(index)
+        # From the last code on, because what a code keeps for later ones may need values of earlier ones.
+        for number in range(len(loops), 0, -1):
+            own = [stage == number for stage in stages]
+            later = kept[number] if number < len(loops) else set[int]()
+            for index in self._needed([*wanted[number], *sorted(later)], own, inputs=False):
+                kept[stages[index]].add(index)
+        values = [sorted(each) for each in kept]
+        codes, steps = [], []
+        for number in range(len(loops) + 1):
+            if number < len(loops):
+                ports = [*loops[number].state, Port(f"{_KEPT}{number}", (len(values[number]),))]
+                nodes = [*wanted[number], *values[number]]
+            else:
+                ports, nodes = outputs, results
+            codes.append(self._part(number, values[:number], ports, nodes, step=False))
+            if number < len(loops):
+                loop = loops[number]
+                steps.append(self._part(number, values[: number + 1], loop.state, loop.next_state, step=True))
+        found = Repetition(
+            tuple(self._ports),
+            tuple(outputs),
+            tuple(codes),
+            tuple(steps),
+            tuple(loop.most for loop in loops),
         )
-        port = Port(KEPT, (len(kept),))
-        before = extract_program(self._graph, self._ports, [*self._states, port], [*self._first, *kept])
-        step = self._part([*self._states, port], kept, self._size, self._states, self._next)
-        arrays = self._size + size
-        after = self._part([*self._ports, *self._states, port], kept, arrays, outputs, results)
-        for program in (before, step, after):
+        for program in found.parts:
             check_program(program)
-        return Repetition(tuple(self._ports), tuple(outputs), before, step, after, self._most)
-
-    def _dependent(self, slots: range) -> list[bool]:
-        """Return for each node whether it depends on these inputs."""
-        found: list[bool] = []
-        for node in self._graph.nodes:
-            found.append(node.slot in slots if node.op == "input" else any(found[arg] for arg in node.args))
         return found
 
+    def _stages(self) -> tuple[list[int], list[int]]:
+        """Return for each node the number of loops whose last state it depends on, and the number, from 1 on,
+        of the loop inside of which it is; 0 outside of all."""
+        of_slot: dict[int, tuple[int, int]] = {}
+        for number, loop in enumerate(self._loops, 1):
+            of_slot.update(dict.fromkeys(loop.in_loop, (0, number)))
+            of_slot.update(dict.fromkeys(loop.last, (number, 0)))
+        stages: list[int] = []
+        inside: list[int] = []
+        for node in self._graph.nodes:
+            if node.op == "input":
+                stage, loop_number = of_slot.get(node.slot, (0, 0))
+            else:
+                stage = max((stages[arg] for arg in node.args), default=0)
+                within = {inside[arg] for arg in node.args} - {0}
+                if len(within) > 1:
+                    raise TraceError(_LEAKS)
+                loop_number = within.pop() if within else 0
+            if loop_number and stage >= loop_number:
+                raise TraceError(_LEAKS)
+            stages.append(stage)
+            inside.append(loop_number)
+        return stages, inside
+
     def _needed(self, results: Sequence[int], own: Sequence[bool], *, inputs: bool) -> set[int]:
-        """Return the nodes that `results` or their `own` ancestors use and that are not own: no constants,
-        and `inputs` only if they shall be kept too."""
+        """Return the nodes that `results` or their `own` ancestors use and that are not own: no constants, no
+        states, and `inputs` of the function only if they shall be kept too."""
         alive, needed = set(results), set[int]()
         for index in range(max(alive, default=-1), -1, -1):
-            op = self._graph.nodes[index].op
-            if index not in alive or op == "constant" or (op == "input" and (own[index] or not inputs)):
+            node = self._graph.nodes[index]
+            if index not in alive or node.op == "constant":
+                continue
+            if node.op == "input" and (node.slot >= self._size or not inputs):
                 continue
             if own[index]:
-                alive.update(self._graph.nodes[index].args)
+                alive.update(node.args)
             else:
                 needed.add(index)
         return needed
 
     def _part(
         self,
-        inputs: Sequence[Port],
-        kept: Sequence[int],
-        first_state: int,
+        number: int,
+        kept: Sequence[Sequence[int]],
         outputs: Sequence[Port],
         results: Sequence[int],
+        *,
+        step: bool,
     ) -> Program:
-        """Return the program of a part. Kept nodes and the state from slot `first_state` are its inputs, and
-        in the code after the loop the arrays."""
-        graph, size = Graph(), sum(port.size for port in self._states)
-        own = sum(port.size for port in inputs) - size - len(kept)
+        """Return the program of a part after `number` loops, or of the step of the next one.
+
+        Its inputs are those of the function, which a step does not have, the last states, the state of a
+        step, and the values of `kept`.
+        """
+        graph = Graph()
         graph.nodes = list(self._graph.nodes)
+        ports = [] if step else list(self._ports)
+        slots = {} if step else {slot: slot for slot in range(self._size)}
+        size = len(slots)
+        states = [(loop.state, loop.last) for loop in self._loops[:number]]
+        if step:
+            states.append((self._loops[number].state, self._loops[number].in_loop))
+        for state, places in states:
+            ports += state
+            slots.update(zip(places, range(size, size + len(places)), strict=True))
+            size += len(places)
         for index, node in enumerate(graph.nodes):
-            if node.op == "input" and node.slot >= self._size:
-                graph.nodes[index] = Node("input", slot=node.slot - first_state + own)
-        for place, index in enumerate(kept):
-            if own == 0 or graph.nodes[index].op != "input":
-                graph.nodes[index] = Node("input", slot=own + size + place)
-        return extract_program(graph, inputs, outputs, results)
+            if node.op == "input" and node.slot in slots:
+                graph.nodes[index] = Node("input", slot=slots[node.slot])
+        for k, nodes in enumerate(kept):
+            ports.append(Port(f"{_KEPT}{k}", (len(nodes),)))
+            for place, index in enumerate(nodes, size):
+                # A code reads the inputs of the function from their arrays.
+                if step or self._graph.nodes[index].op != "input":
+                    graph.nodes[index] = Node("input", slot=place)
+            size += len(nodes)
+        return extract_program(graph, ports, outputs, results)
 
     def _repeat(self, step: Step, state: Numbers, most: int) -> Numbers:
-        if self._states:
-            raise TraceError("a traced function repeats a step twice")
+        if self._is_open:
+            raise TraceError("the step of a loop has a loop inside")
         if GOES_ON not in state:
             raise TraceError(f"the state of a loop has no entry {GOES_ON}")
-        named = {f"{_STATE}{name}": np.asarray(array) for name, array in state.items()}
-        self._states, self._first = self._entries(named)
-        self._most = most
-        old, last = self._state(state, 0), self._state(state, 1)
+        number = len(self._loops)
+        named = {f"{_STATE}{number}.{name}": np.asarray(array) for name, array in state.items()}
+        ports, first = self._entries(named)
+        middle, end = self._slots + len(first), self._slots + 2 * len(first)
+        loop = _Loop(ports, range(self._slots, middle), range(middle, end), first, most)
+        self._loops.append(loop)
+        self._slots = end
+        old, last = (self._state(state, ports, slots.start) for slots in (loop.in_loop, loop.last))
+        self._is_open = True
         new = step(old)
+        self._is_open = False
         goes_on = old[GOES_ON].ravel()[0]
         chosen = {}
         for name, array in old.items():
@@ -199,14 +280,13 @@ class _Tracer:
             pairs = zip(np.ravel(new[name]), array.ravel(), strict=True)
             entries[:] = [select(goes_on, a, b) for a, b in pairs]
             chosen[name] = entries.reshape(array.shape)
-        _, self._next = self._entries(chosen)
+        _, loop.next_state = self._entries(chosen)
         return last
 
-    def _state(self, state: Numbers, number: int) -> Numbers:
-        first = self._size + number * sum(port.size for port in self._states)
+    def _state(self, state: Numbers, ports: Sequence[Port], start: int) -> Numbers:
         return {
-            name: symbols(self._graph, port, first + slots.start)
-            for name, (port, slots) in zip(state, scalar_ranges(self._states), strict=True)
+            name: symbols(self._graph, port, start + slots.start)
+            for name, (port, slots) in zip(state, scalar_ranges(ports), strict=True)
         }
 
     def _entries(self, arrays: Mapping[str, Array]) -> tuple[list[Port], list[int]]:
@@ -235,9 +315,10 @@ class _PortSlots:
         arrays = {port.name: k for k, port in enumerate(repetition.inputs)}
         slots: dict[str, int] = {}
         size = 0
-        for port in repetition.before.outputs:
-            slots[port.name] = size
-            size += port.size
+        for code in repetition.codes[:-1]:
+            for port in code.outputs:
+                slots[port.name] = size
+                size += port.size
         return cls(arrays, slots, size)
 
 
@@ -317,14 +398,16 @@ def emit_repetition(repetition: Repetition, target: Processor, settings: Setting
     bodies: list[str] = []
     calls: list[list[int]] = []
     size = layout.size
+    last = len(repetition.parts) - 1
     for part, program in enumerate(repetition.parts):
+        is_step = part % 2 == 1
         segments = schedule(program, settings.lanes, settings.segment)
         check_schedule(program, segments, settings.lanes)
         spilled = spill_slots(program, segments)
         slots = {node: layout.size + slot for node, slot in spilled.items()}
         size = max(size, layout.size + max(spilled.values(), default=-1) + 1)
-        sources = list(_places(program.inputs, layout, repetition.inputs, arrays=part != 1))
-        if part < 2:
+        sources = list(_places(program.inputs, layout, repetition.inputs, arrays=not is_step))
+        if part < last:
             targets = list(_places(program.outputs, layout, (), arrays=False))
         else:
             targets = [(False, len(repetition.inputs) + k) for k in range(len(program.outputs))]
@@ -339,13 +422,14 @@ def emit_repetition(repetition: Repetition, target: Processor, settings: Setting
                 first + k,
                 inputs=sources,
                 outputs=targets,
-                at_once=part == 0,
+                at_once=part < last and not is_step,
             ).text("")
             for k, segment in enumerate(segments)
         ]
         calls.append(list(range(first, len(bodies))))
     declared = [f"declare void @segment{k}(ptr, i64, ptr)" for k in range(len(bodies))]
-    loop = _loop(repetition, layout.slots[f"{_STATE}{GOES_ON}"], calls, size, settings.lanes)
+    goes_on = [layout.slots[f"{_STATE}{k}.{GOES_ON}"] for k in range(len(repetition.steps))]
+    loop = _loop(repetition, goes_on, calls, size, settings.lanes)
     return [_module(texts, target, settings) for texts in (*([body] for body in bodies), [*declared, loop])]
 
 
@@ -363,46 +447,56 @@ def _module(functions: Sequence[str], target: Processor, settings: Settings) -> 
 
 
 def _loop(
-    repetition: Repetition, goes_on: int, calls: Sequence[Sequence[int]], slots: int, lanes: int
+    repetition: Repetition, goes_on: Sequence[int], calls: Sequence[Sequence[int]], slots: int, lanes: int
 ) -> str:
     """Return the entry function (`dynx.simd.emit`)."""
     vector = f"<{lanes} x double>"
-    before, step, after = (
+    parts = [
         [f"  call void @segment{k}(ptr %arguments, i64 %first, ptr %kept)" for k in numbers]
         for numbers in calls
-    )
+    ]
+    lines = [
+        f"define void @{ENTRY}(ptr noalias nocapture readonly %arguments) {{",
+        "entry:",
+        f"  %kept = alloca [{slots} x {vector}], align 64",
+        *(
+            f"  %goes_on_at{k} = getelementptr {vector}, ptr %kept, i64 {slot}"
+            for k, slot in enumerate(goes_on)
+        ),
+        "  %n = load i64, ptr %arguments",
+        f"  %last = sub i64 %n, {lanes}",
+        *prefetch_pointers(repetition.inputs, repetition.outputs),
+        "  br label %group",
+        "group:",
+        f"  %i = phi i64 [0, %entry], [%next, %end{len(goes_on) - 1}]",
+        "  %late = icmp sgt i64 %i, %last",
+        "  %first = select i1 %late, i64 %last, i64 %i",
+        *prefetch(repetition.inputs, repetition.outputs, lanes),
+        *parts[0],
+    ]
+    for k, most in enumerate(repetition.most):
+        before = "group" if k == 0 else f"end{k - 1}"
+        lines += [
+            f"  br label %test{k}",
+            f"test{k}:",
+            f"  %count{k} = phi i64 [0, %{before}], [%next{k}, %repeat{k}]",
+            f"  %goes_on{k} = load {vector}, ptr %goes_on_at{k}, align {8 * lanes}",
+            f"  %some{k} = fcmp une {vector} %goes_on{k}, zeroinitializer",
+            f"  %bits{k} = bitcast <{lanes} x i1> %some{k} to i{lanes}",
+            f"  %any{k} = icmp ne i{lanes} %bits{k}, 0",
+            f"  %in_time{k} = icmp slt i64 %count{k}, {most}",
+            f"  %more{k} = and i1 %any{k}, %in_time{k}",
+            f"  br i1 %more{k}, label %repeat{k}, label %end{k}",
+            f"repeat{k}:",
+            *parts[2 * k + 1],
+            f"  %next{k} = add i64 %count{k}, 1",
+            f"  br label %test{k}",
+            f"end{k}:",
+            *parts[2 * k + 2],
+        ]
     return "\n".join(
         [
-            f"define void @{ENTRY}(ptr noalias nocapture readonly %arguments) {{",
-            "entry:",
-            f"  %kept = alloca [{slots} x {vector}], align 64",
-            f"  %goes_on_at = getelementptr {vector}, ptr %kept, i64 {goes_on}",
-            "  %n = load i64, ptr %arguments",
-            f"  %last = sub i64 %n, {lanes}",
-            *prefetch_pointers(repetition.inputs, repetition.outputs),
-            "  br label %group",
-            "group:",
-            "  %i = phi i64 [0, %entry], [%next, %end]",
-            "  %late = icmp sgt i64 %i, %last",
-            "  %first = select i1 %late, i64 %last, i64 %i",
-            *prefetch(repetition.inputs, repetition.outputs, lanes),
-            *before,
-            "  br label %test",
-            "test:",
-            "  %count = phi i64 [0, %group], [%count_next, %repeat]",
-            f"  %goes_on = load {vector}, ptr %goes_on_at, align {8 * lanes}",
-            f"  %some = fcmp une {vector} %goes_on, zeroinitializer",
-            f"  %bits = bitcast <{lanes} x i1> %some to i{lanes}",
-            f"  %any = icmp ne i{lanes} %bits, 0",
-            f"  %in_time = icmp slt i64 %count, {repetition.most}",
-            "  %more = and i1 %any, %in_time",
-            "  br i1 %more, label %repeat, label %end",
-            "repeat:",
-            *step,
-            "  %count_next = add i64 %count, 1",
-            "  br label %test",
-            "end:",
-            *after,
+            *lines,
             f"  %next = add i64 %i, {lanes}",
             "  %more_groups = icmp slt i64 %next, %n",
             "  br i1 %more_groups, label %group, label %done",

@@ -1,4 +1,4 @@
-"""Kernels with a loop inside: Newton's iteration, lanes that end at different times, misuse."""
+"""Kernels with loops inside: Newton's iteration, lanes that end at different times, misuse."""
 
 from __future__ import annotations
 
@@ -125,10 +125,47 @@ def run_one(repetition: Repetition, x: float) -> Floats:
     return np.asarray(found[0])
 
 
+def roots_of(x: Array, scale: Array, repeat: Any) -> Numbers:
+    """Return the root of x scale and, where it is above 10, its own root, by two loops.
+
+    The second loop and the code after it use values from before the first loop, and of between them.
+    """
+    first = root_of(x, scale, repeat)
+    root, third = first["root"][0], x[0] * scale[0] / 3.0
+
+    def newton(state: Numbers) -> Numbers:
+        y = state["y"][0]
+        better = 0.5 * (y + root / y)
+        goes_on = less(1e-9 * root, abs(better * better - root))
+        return {"y": np.array([better]), "goes_on": np.array([goes_on])}
+
+    start = {"y": np.array([1.0 + 0.0 * root]), "goes_on": np.array([less(10.0, root)])}
+    last = repeat(newton, start, MOST)["y"][0]
+    return {**first, "last": np.array([last, last * third, root + last])}
+
+
+def test_a_second_loop_begins_where_its_state_says_so() -> None:
+    kernel = load_repetition(trace_repetition(roots_of, {"x": (20,), "scale": (1,)}))
+    x, scale = samples(37)
+    found = [np.full((len(x), port.size), np.nan) for port in kernel.outputs]
+    kernel([x, scale], found)
+    begun = 0
+    for k in range(len(x)):
+        wanted = roots_of(x[k], scale[k], on_numbers)
+        for port, mine in zip(kernel.outputs, found, strict=True):
+            # The error of the first root is a difference of equal numbers.
+            expected = np.asarray(wanted[port.name], dtype=float)
+            np.testing.assert_allclose(
+                mine[k], expected, rtol=1e-13, atol=1e-8 if port.name == "error" else 0
+            )
+        begun += found[-1][k, 0] != 1.0
+    assert 5 < begun < 32
+
+
 def test_misuse_is_refused() -> None:
-    def twice(x: Array, repeat: Any) -> Numbers:
+    def nested(x: Array, repeat: Any) -> Numbers:
         state = {"goes_on": x}
-        return dict(repeat(lambda s: s, repeat(lambda s: s, state, 2), 2))
+        return dict(repeat(lambda s: dict(repeat(lambda t: t, s, 2)), state, 2))
 
     def leaks(x: Array, repeat: Any) -> Numbers:
         seen = []
@@ -147,7 +184,7 @@ def test_misuse_is_refused() -> None:
         return dict(repeat(lambda s: s, {"y": x}, 2))
 
     for function, message in (
-        (twice, "repeats a step twice"),
+        (nested, "has a loop inside"),
         (leaks, "beside the state"),
         (never, "repeats nothing"),
         (endless, "no entry goes_on"),
