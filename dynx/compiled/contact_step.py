@@ -25,6 +25,7 @@ def contact_step_text(
     kp: Floats | float,
     kd: Floats | float,
     friction: float,
+    max_torque: Floats | float | None = None,
     axes: Sequence[tuple[float, float, float]] = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
     offset: float = 0.0,
     sweeps: Sweeps | None = None,
@@ -32,9 +33,10 @@ def contact_step_text(
     """Return the text of a step of `h` [s] for `dynx.compiled.step`.
 
     `spheres` has the radius [m] of a sphere at the origin of each frame, `kp` and `kd` (n joints,) are the
-    gains. Inputs and outputs are q (nq,), v (nv,) and impulses (3 n,). Another input is target (n joints,),
-    another output residual (1,). `axes` and `offset` are those of the plane (`SpheresOnPlane`). Damping and
-    armature of the joints are in the step. Raises UnsupportedFeatureError for a robot with mimic joints, ball
+    gains of the motors, `max_torque` (n joints,) their largest torques [N m or N]. Inputs and outputs are q
+    (nq,), v (nv,) and impulses (3 n,). Another input is target (n joints,), another output residual (1,).
+    `axes` and `offset` are those of the plane (`SpheresOnPlane`). Damping and armature of the joints are in
+    the step. Raises UnsupportedFeatureError for a robot with mimic joints, ball
     joints, dry friction or springs, and UnknownNameError for an unknown frame.
     """
     refuse_ball_joints(model, "a compiled step with contacts")
@@ -56,6 +58,7 @@ def contact_step_text(
         np.full(n, kd),
         np.array([each.damping for each in dynamics]),
         np.array([each.armature for each in dynamics]),
+        None if max_torque is None else np.full(n, max_torque),
     )
     touching = SpheresOnPlane(
         tuple(model.frame_index(name) for name in spheres),

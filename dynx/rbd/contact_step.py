@@ -10,6 +10,9 @@ The impulses x obey the laws of `dynx.rbd.constraints`: a contact whose gap phi 
 the normal velocity J v' + phi / h. A penetration is removed slowly, by `RECOVERY` of it in a step and at most
 at `MAX_RECOVERY_SPEED`, because the velocity that removes it remains.
 
+A motor has a largest torque. A torque that exceeds it at the end of the step, with the impulses of the step
+before, is constant at the limit in this step.
+
 The factors of M are those of a tree (`dynx.rbd.elimination`), so that a row of J has entries only at the
 joints between the base and the body that touches. Velocities of contacts are in axes that do not rotate
 during the step, in which `dynx.rbd.integration` moves a floating base.
@@ -33,14 +36,12 @@ from dynx.rbd.eliminated_rows import (
     eliminate_tips,
     substitute_back,
 )
-from dynx.rbd.elimination import (
-    factorize_mass_matrix,
-)
+from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
 from dynx.rbd.integration import floating_step
 from dynx.rbd.kinematics import ancestry
 from dynx.rbd.placement import Placement
 from dynx.rbd.rnea import bias_torque
-from dynx.spatial.scalar import Array, Floats, less, maximum
+from dynx.spatial.scalar import Array, less, maximum, minimum, select
 from dynx.spatial.so3 import cross, rotate, rotation_from_quat
 
 RECOVERY = 0.2
@@ -85,10 +86,12 @@ class SpheresOnPlane:
 class ServoJoints:
     """PD motors of the joints, and what else acts on them; arrays (n joints,)."""
 
-    kp: Floats
-    kd: Floats
-    damping: Floats
-    armature: Floats
+    kp: Array
+    kd: Array
+    damping: Array
+    armature: Array
+    max_torque: Array | None = None
+    """Largest torque of each motor [N m or N]; None without a limit."""
 
 
 @dataclass(frozen=True)
@@ -132,16 +135,30 @@ def contact_step(
     violation of the laws of contact.
     """
     base, last = mechanism.nv - len(mechanism.bodies), mechanism.nv - 1
-    kp, kd = joints.kp, joints.kd + joints.damping
-    stiff = np.concatenate([np.zeros(base), joints.armature + h * kd + h * h * kp])
-    L, D = factorize_mass_matrix(mechanism, mass_matrix(mechanism, q) + np.diag(stiff))
+    M = mass_matrix(mechanism, q)
     bias = bias_torque(mechanism if regrouped is None else regrouped, q, v)
     rates = v[base:]
-    motors = kp * (target - q[len(q) - len(rates) :] - h * rates) - kd * rates
-    rest = eliminate_tips(L, np.concatenate([-bias[:base], motors - bias[base:]]))
+    rows, gaps = contact_rows(mechanism, spheres, q)
+    motors, stiffness = motor_law(joints, h, q[len(q) - len(rates) :], rates, target)
+    others, added = -bias, joints.armature + h * joints.damping
+    others[base:] = others[base:] - joints.damping * rates
+
+    def factors(stiffness: Array) -> tuple[list[dict[int, Array]], list[Array]]:
+        diagonal = np.concatenate([np.zeros(base), added + stiffness])
+        return factorize_mass_matrix(mechanism, M + np.diag(diagonal))
+
+    if joints.max_torque is not None:
+        pushed = others.astype(object)
+        for row, impulse in zip(rows, impulses, strict=True):
+            for k, each in row.items():
+                pushed[last - k] = pushed[last - k] + each * (impulse / h)
+        pushed[base:] = pushed[base:] + motors
+        a = solve_with_factors(*factors(stiffness), pushed)
+        motors, stiffness = _limited(joints.max_torque, motors, stiffness, a[base:])
+    L, D = factors(stiffness)
+    rest = eliminate_tips(L, np.concatenate([others[:base], motors + others[base:]]))
     # The velocity at the end is v + L^-T u.
     u = [h * each / pivot for each, pivot in zip(rest, D, strict=True)]
-    rows, gaps = contact_rows(mechanism, spheres, q)
     eliminated = eliminate_rows(L, D, rows)
     moved = _in_fixed_axes(mechanism, v, h)
     c: list[Any] = []
@@ -163,6 +180,25 @@ def contact_step(
         v = v + h * a
         q = q + h * v
     return {"q": q, "v": v, "impulses": impulses, "residual": _objects([residual])}
+
+
+def motor_law(
+    joints: ServoJoints, h: float, positions: Array, rates: Array, target: Array
+) -> tuple[Array, Array]:
+    """Return the torques b (n,) of the motors without acceleration, and K (n,): at the end of a step from
+    `positions` and `rates` (n,) with the accelerations a the torques are b - K a."""
+    kp, kd = joints.kp, joints.kd
+    return kp * (target - positions - h * rates) - kd * rates, h * kd + h * h * kp
+
+
+def _limited(limit: Array, motors: Array, stiffness: Array, a: Array) -> tuple[Array, Array]:
+    """Return b and K (n,) of motors whose torques b - K a are within their limits (n,) at accelerations a
+    (n,), and the limit and 0 for the others."""
+    found: list[tuple[Any, Any]] = []
+    for b, K, most, wanted in zip(motors, stiffness, limit, motors - stiffness * a, strict=True):
+        inside, held = less(abs(wanted), most), minimum(maximum(wanted, -most), most)
+        found.append((select(inside, b, held), select(inside, K, 0.0)))
+    return _objects([b for b, _ in found]), _objects([K for _, K in found])
 
 
 def contact_rows(

@@ -160,6 +160,34 @@ def rested(kernel: Any, seconds: float, height: float) -> list[Floats]:
     return state
 
 
+def test_motors_have_a_largest_torque() -> None:
+    """Motors that exceed it by the law at the end of the step have the limit; others obey the law."""
+    model, limit = a1(), 20.0
+    q, v, target, _ = states(40, seed=5)
+    q[:, 2], none = 1.0, np.zeros((40, 12))
+    found = steps(compiled(text_of(model, max_torque=limit)), q, v, target, none)
+    robot = dynx.backend("reference", model)
+    K, slack = np.full(12, H * KD + H * H * KP), []
+    for k in range(len(q)):
+        M, bias = robot.mass_matrix(q[k]), robot.bias_torque(q[k], v[k])
+        motors = KP * (target[k] - q[k, 7:] - H * v[k, 6:]) - KD * v[k, 6:]
+
+        def solution(motors: Floats, K: Floats, M: Floats = M, bias: Floats = bias) -> Floats:
+            rest = np.concatenate([np.zeros(6), motors]) - bias
+            return np.asarray(np.linalg.solve(M + np.diag([0.0] * 6 + [*K]), rest))
+
+        wanted = motors - K * solution(motors, K)[6:]
+        over = np.abs(wanted) >= limit
+        a = solution(np.where(over, np.clip(wanted, -limit, limit), motors), np.where(over, 0.0, K))
+        np.testing.assert_allclose(found[1][k, 6:], v[k, 6:] + H * a[6:], rtol=0.0, atol=1e-9)
+        slack.append(over)
+    assert 0.1 < np.mean(slack) < 0.9
+    free = steps(compiled(text_of(model)), q, v, target, none)
+    loose = steps(compiled(text_of(model, max_torque=1e6)), q, v, target, none)
+    for a, b in zip(free, loose, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-12)
+
+
 def test_standing_on_a_plane_and_on_a_slope() -> None:
     """The forces sum to the weight, and nothing creeps within the cone of friction (tan 0.5 < 0.7)."""
     weight = float(a1().total_mass) * 9.81
