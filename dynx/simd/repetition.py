@@ -94,8 +94,8 @@ def trace_repetition(
 
     It calls ``repeat(step, state, most)`` for each loop, which returns the last state. ``step(state)``
     returns the next state, arrays by the same names; it may also use whatever was computed before. What it
-    computes without the state is computed once. The loop ends after `most` steps, or where ``goes_on`` (1,) of the
-    state is 0. Raises TraceError as `trace` does, or if the function does not keep to this.
+    computes without the state is computed once. The loop ends after `most` steps, or where ``goes_on`` (1,)
+    of the state is 0. Raises TraceError as `trace` does, or if the function does not keep to this.
     """
     with collection_paused():
         return _Tracer(inputs, simplify).repetition(function)
