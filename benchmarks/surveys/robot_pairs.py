@@ -8,8 +8,8 @@
 SNAPSHOTS holds a Git directory ``OWNER+NAME/repo`` of each of `REPOSITORIES`; FOLDER is for their files.
 ``list`` reads each file by dynx, and gives each MJCF and SDF file the URDF file whose robot it describes: one
 that shares a word of its path and half of the names of its joints, of the same repository if that has one.
-Files of example-robot-data count as those of a repository. Half of the pairs, by the SHA-256 of their names,
-are to develop on, the other half to measure. ``run`` checks SHA-256 and compares each pair with `TOLERANCE`.
+Files of example-robot-data count as those of a repository. Each pair is for development or for
+measurement, by the SHA-256 of its names. ``run`` checks SHA-256 and compares each pair with `TOLERANCE`.
 Then engines that know nothing of dynx judge the report: Pinocchio loads the URDF file, MuJoCo or Drake the
 other one, and joint-space inertias (without those of a floating base, whose frame is free) are compared.
 
@@ -409,6 +409,8 @@ def judged(result: PairResult, report: SameReport, text: str, other: str) -> Pai
     """Return the result with what engines say."""
     floating = report.T_first_second is not None
     rows = report.coordinates
+    if not rows:
+        return replace(result, note=f"{result.note}; not judged: no joint has a counterpart")
     rng = np.random.default_rng(0)
     states = [rng.uniform(-0.5, 0.5, len(rows)) for _ in range(STATES)]
     signs = np.array([row.sign for row in rows])
@@ -551,12 +553,13 @@ def summary(results: Sequence[PairResult]) -> str:
     words = {word: sum(each.word == word for each in results) for word in ("same", "different", "refused")}
     judged_ones = [each for each in results if each.engines is not None or each.mended is not None]
     reinserted = sum(each.reinserted for each in results)
+    effective = reinserted - sum(len(each.unreal) for each in results)
     return (
-        f"{len(results)} pairs: in {words['same']} pairs both files describe the same robot, in "
-        f"{words['different']} they differ, and {words['refused']} pairs are refused. Engines checked "
-        f"{len(judged_ones)} pairs, and show a missed difference in {sum(map(missed, results))}. Of "
-        f"{reinserted} reinserted elements, {sum(len(each.unreal) for each in results)} have no effect in "
-        "Pinocchio."
+        f"Of {len(results)} pairs, both files describe the same robot in {words['same']} pairs, and "
+        f"different robots in {words['different']} pairs. Pairs that dynx refuses: {words['refused']}. Engines "
+        f"checked the reports of {len(judged_ones)} pairs. Pairs with a missed difference: "
+        f"{sum(map(missed, results))}. Of {reinserted} reinserted elements, {effective} change the "
+        "robot in Pinocchio."
     )
 
 

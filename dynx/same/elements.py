@@ -710,8 +710,8 @@ class _Inertias:
             others = self._beside(theirs, theirs.links[each.body.theirs], each.link)
         message = _inertial_message(old, new)
         if my_others or others:
-            less = f" less {_names_text(others)}" if others else ""
-            message = f"merged body{less}: {message}"
+            without = f" without {_names_text(others)}" if others else ""
+            message = f"merged body{without}: {message}"
         return DifferingElement(
             "inertial",
             "link",
