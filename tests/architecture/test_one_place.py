@@ -26,7 +26,7 @@ IDEAS = {
     "joint wrenches": r"^def joint_wrenches\b",
     "external torque from a motion": r"^class MomentumObserver\b",
     "acceleration from two states": r"^class MeanAcceleration\b",
-    "mean contacts": r"^class ContactInterval\b",
+    "contact forces, as means over a time interval": r"^class ContactInterval\b",
     "a scene in MuJoCo": r"^class MjcfDocument\b",
     "a document in MJCF": r"\bElement\(\"mujoco\"",
     "types of arguments": r"^def checks_types\b",

@@ -251,11 +251,11 @@ PLANT = PlantKind("the name of a backend or plant, or a ScenePlant", str | dict[
 CONFIGURATION = Coordinates("(nq,)", NumberOrArray)
 VELOCITY = Coordinates("(nv,)", NumberOrArray)
 _JOINT_VALUES = (
-    "True (values of the description); one number for all joints; one number for each joint; "
-    "or a dict of numbers by joint name"
+    "True (values of the description); False ({without}); one number for all joints; "
+    "one number for each joint; or a dict of numbers by joint name"
 )
-COEFFICIENTS = JointNumbers(_JOINT_VALUES, NumberOrArray)
-LIMITS = JointNumbers(_JOINT_VALUES, NumberOrArray, others=math.inf)
+COEFFICIENTS = JointNumbers(_JOINT_VALUES.format(without="0"), NumberOrArray)
+LIMITS = JointNumbers(_JOINT_VALUES.format(without="unlimited"), NumberOrArray, others=math.inf)
 FACTORS = Factors("a factor, or factors by link", float | dict[str, Any])
 NOISE = Parts("a dynx.Noise, as in Noise(v=1e-3)", dict[str, Any], "dynx.sim.noise:Noise", several=False)
 PAYLOADS = Parts(
@@ -433,7 +433,7 @@ class SimulationOptions:
     )
     noise: Noise | None = option(
         None,
-        "Noise of the measurements and random numbers of the controller",
+        "Noise of the measurements; its seed also gives the random numbers of the controller",
         kind=NOISE,
         group=ERRORS,
         default_words="none",
