@@ -14,6 +14,10 @@ This is the nonlinear complementarity problem of Signorini and Coulomb, without 
 slide do not separate (Le Lidec et al., Contact models in robotics: a comparative analysis, 2023). A
 speculative contact, whose gap phi may close in the step of length h, has c + phi / h in place of c.
 
+**Overlaps** are taken back by a displacement without velocity, so that errors of positions make no kinetic
+energy: parts that overlap may not close further, and the displacement of the step is that of the velocities
+plus that of further impulses, without friction, which end a part of each overlap (`displacement_velocity`).
+
 **Sweeps** (projected Gauss-Seidel) visit one set after the other: x becomes the point of the set closest to
 x - w / g, with the largest eigenvalue g of the set's block of G. A fixed point is a solution. One sweep is
 text for any scalar; `frozen_sweep` stops where the largest change is small, each lane of a kernel for itself.
@@ -41,6 +45,35 @@ from dynx.spatial.scalar import FLOAT64_EPS, Array, Floats, less, maximum, minim
 
 TINY = 1e-300
 """Term that keeps quotients finite where both numbers are zero."""
+
+CORRECTION = 0.2
+"""Part of an overlap that one step takes back; of an error of a constraint it takes back all."""
+
+MAX_CORRECTION_SPEED = 1.0
+"""Largest speed [m/s or rad/s] at which a step takes back an overlap or an error of a constraint."""
+
+NEGLIGIBLE = 1e-10
+"""Overlap and error of a constraint [m or rad] that count as none."""
+
+
+def opening_velocity(gap: Any, h: float) -> Any:
+    """Return the velocity [m/s or rad/s] that a gap [m or rad] adds to a unilateral row, for any scalar.
+
+    Gaps of parts that touch are rounding. With them the points of a face would have no common solution, and
+    the impulses would jump from three points to others in every step.
+    """
+    return select(less(NEGLIGIBLE, gap), gap / h, 0.0)
+
+
+def displacement_velocity(gap: Any, w: Any, h: float) -> Any:
+    """Return the velocity of a unilateral row that the displacement of a step makes at least 0.
+
+    `w` is the velocity of the row at the end of the step, without the part of its gap, for any scalar. Where
+    parts overlap, the step moves apart by `CORRECTION` of the overlap beside that; elsewhere it may close the
+    gap and no more.
+    """
+    back = maximum(gap * (CORRECTION / h), -MAX_CORRECTION_SPEED) + maximum(w, 0.0)
+    return select(less(gap, 0.0), back, gap / h + w)
 
 
 class Disk(NamedTuple):
@@ -119,9 +152,15 @@ def scales(sets: ConstraintSets, G: Array) -> list[Any]:
     for disk in sets.disks:
         if len(disk.rows) == 2:
             i, j = disk.rows
-            mean, half, cross = 0.5 * (G[i, i] + G[j, j]), 0.5 * (G[i, i] - G[j, j]), G[i, j]
-            found[i] = found[j] = mean + _root(half * half + cross * cross) + TINY
+            found[i] = found[j] = largest_eigenvalue(G[i, i], G[j, j], G[i, j]) + TINY
     return found
+
+
+def largest_eigenvalue(a: Any, b: Any, c: Any) -> Any:
+    """Return the largest eigenvalue of the symmetric matrix with the diagonal a, b and the entry c, for any
+    scalar."""
+    half = 0.5 * (a - b)
+    return 0.5 * (a + b) + _root(half * half + c * c)
 
 
 def sweep(
@@ -157,7 +196,7 @@ def sweep(
         else:
             rows = sets.disks[number].rows
             wanted = [x[row] - w[row] / g[row] for row in rows]
-            share = _share(_radius(sets.disks[number], limits[number], x), wanted)
+            share = disk_share(_radius(sets.disks[number], limits[number], x), wanted)
             for row, each in zip(rows, wanted, strict=True):
                 apply(row, share * each)
     return np.array(x, dtype=w.dtype), w, change
@@ -210,10 +249,10 @@ def residuals(
         radius = _radius(disk, limits[number], impulses)
         held = [impulses[row] for row in rows]
         wanted = [x - velocities[row] / scale for x, row in zip(held, rows, strict=True)]
-        share = _share(radius, wanted)
+        share = disk_share(radius, wanted)
         missed = [x - share * y for x, y in zip(held, wanted, strict=True)]
-        friction = maximum(friction, scale * _norm(missed))
-        cone = maximum(cone, scale * (_norm(held) - radius))
+        friction = maximum(friction, scale * norm(missed))
+        cone = maximum(cone, scale * (norm(held) - radius))
     for row in sets.free:
         free = maximum(free, abs(velocities[row]))
     return Residuals(gap, complementarity, friction, cone, free)
@@ -223,12 +262,13 @@ def _radius(disk: Disk, limit: Any, x: Sequence[Any] | Array) -> Any:
     return limit if disk.normal is None else limit * maximum(x[disk.normal], 0.0)
 
 
-def _share(radius: Any, wanted: Sequence[Any]) -> Any:
-    """Return the factor by which a vector is shortened to at most `radius`."""
-    return minimum(1.0, radius / (_norm(wanted) + TINY))
+def disk_share(radius: Any, wanted: Sequence[Any]) -> Any:
+    """Return the factor by which a vector is shortened to at most `radius`, for any scalar."""
+    return minimum(1.0, radius / (norm(wanted) + TINY))
 
 
-def _norm(vector: Sequence[Any]) -> Any:
+def norm(vector: Sequence[Any]) -> Any:
+    """Return the length of a vector of one or two components, for any scalar."""
     if len(vector) == 1:
         return abs(vector[0])
     return _root(vector[0] * vector[0] + vector[1] * vector[1])

@@ -1,34 +1,49 @@
-"""One step of a robot with PD motors whose spheres touch a plane, for any scalar, without branches on values.
+"""One step of a robot with PD motors that touches the ground, for any scalar, without branches on values.
 
-The step solves motion, motors and contacts for the velocity v' at its end. The motors are implicit: their
-torque is kp (target - q') - kd v' at the end q' = q + h v' of the step. With the armature and the damping D
-of the joints,
+The step solves motion, motors, contacts, joint limits and dry friction for the velocity v' at its end. The
+motors are implicit: their torque is kp (target - q') - kd v' at the end q' = q + h v' of the step. With the
+armature and the damping D of the joints, and the torque s of their springs at the beginning,
 
-    (M + armature + h (kd + D) + h^2 kp) (v' - v) = h (kp (target - q - h v) - (kd + D) v - C v - g) + J' x.
+    (M + armature + h (kd + D) + h^2 kp) (v' - v)
+        = h (kp (target - q - h v) - (kd + D) v + s - C v - g) + J' x.
 
-The impulses x obey the laws of `dynx.rbd.constraints`: a contact whose gap phi >= 0 may close in the step has
-the normal velocity J v' + phi / h. A penetration is removed slowly, by `RECOVERY` of it in a step and at most
-at `MAX_RECOVERY_SPEED`, because the velocity that removes it remains.
+The impulses x obey the laws of `dynx.rbd.constraints`, as in `World(scene, engine="dynx")`: a contact whose
+gap phi >= 0 may close in the step has the normal velocity J v' + phi / h, and a displacement without velocity
+takes back a part of each overlap. A second loop solves for that, which ends at once where nothing overlaps.
 
 A motor has a largest torque. A torque that exceeds it at the end of the step, with the impulses of the step
 before, is constant at the limit in this step.
 
 The factors of M are those of a tree (`dynx.rbd.elimination`), so that a row of J has entries only at the
-joints between the base and the body that touches. Velocities of contacts are in axes that do not rotate
-during the step, in which `dynx.rbd.integration` moves a floating base.
+joints between the base and the body that touches, and sweeps need no Delassus matrix
+(`dynx.rbd.block_sweeps`). Velocities of contacts are in axes that do not rotate during the step, in which
+`dynx.rbd.displacement` moves a floating base.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dynx.model.mechanism import ROOT, Mechanism
-from dynx.rbd.constraints import ConstraintSets, Disk, residuals, scales, sweep
+from dynx.rbd.block_sweeps import (
+    Block,
+    JointBounds,
+    Velocities,
+    all_velocities,
+    as_objects,
+    block_residual,
+    block_sweep,
+    blocks_of,
+    displacement_sweep,
+    impulse_velocities,
+)
+from dynx.rbd.constraints import NEGLIGIBLE, displacement_velocity, opening_velocity
 from dynx.rbd.crba import mass_matrix
+from dynx.rbd.displacement import floating_displacement, floating_end_velocity
 from dynx.rbd.eliminated_rows import (
     EliminatedRows,
     SparseRow,
@@ -37,21 +52,17 @@ from dynx.rbd.eliminated_rows import (
     substitute_back,
 )
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
-from dynx.rbd.integration import floating_step
 from dynx.rbd.kinematics import ancestry
 from dynx.rbd.placement import Placement
 from dynx.rbd.rnea import bias_torque
-from dynx.spatial.scalar import Array, less, maximum, minimum, select
+from dynx.spatial.scalar import Array, Floats, less, maximum, minimum, select
 from dynx.spatial.so3 import cross, rotate, rotation_from_quat
 
-RECOVERY = 0.2
-"""Share of a penetration that one step removes."""
-
-MAX_RECOVERY_SPEED = 0.1
-"""Largest velocity by which a penetration is removed [m/s]."""
-
 SWEEPS_PER_TEST = 2
-"""Number of sweeps between two tests whether they may end, because a test takes a third of a sweep's time."""
+"""Number of sweeps between two tests whether they may end, because a test takes time too."""
+
+DISPLACEMENT_SWEEPS = 4
+"""Number of sweeps for the displacement between two tests."""
 
 Numbers = dict[str, Array]
 
@@ -68,30 +79,52 @@ class SpheresOnPlane:
     """Numbers of the frames of the mechanism at whose origins the spheres are."""
     radii: tuple[float, ...]
     """Radii [m]."""
-    friction: float
-    """Coefficient of friction."""
     axes: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     """Normal of the plane, outwards, and two tangents: orthogonal unit vectors."""
     offset: float = 0.0
 
-    @property
-    def sets(self) -> ConstraintSets:
-        """The sets of the rows: for each sphere the normal and two tangents."""
-        rows = [3 * k for k in range(len(self.frames))]
-        disks = tuple(Disk((row + 1, row + 2), row) for row in rows)
-        return ConstraintSets(3 * len(rows), unilateral=tuple(rows), disks=disks)
-
 
 @dataclass(frozen=True)
 class ServoJoints:
-    """PD motors of the joints, and what else acts on them; arrays (n joints,)."""
+    """PD motors and what else acts on joints: arrays (n joints,) of any scalar, but floats for stops."""
 
     kp: Array
     kd: Array
     damping: Array
     armature: Array
+    friction: Array
+    """Torque of dry friction [N m or N]."""
+    stiffness: Array
+    """Stiffness of springs [N m/rad or N/m]."""
+    reference: Array
+    """Positions at which the springs do not pull [rad or m]."""
+    lower: Floats
+    """Lowest positions [rad or m]; minus infinity without a stop."""
+    upper: Floats
+    """Highest positions [rad or m]; infinity without a stop."""
     max_torque: Array | None = None
     """Largest torque of each motor [N m or N]; None without a limit."""
+
+    @classmethod
+    def of(cls, kp: Array, kd: Array, **others: Array | None) -> ServoJoints:
+        """Return motors with gains (n joints,), and zero or no stop for what `others` do not have."""
+        n = len(kp)
+        given: dict[str, Any] = {
+            name: np.zeros(n) for name in ("damping", "armature", "friction", "stiffness", "reference")
+        }
+        given |= {"lower": np.full(n, -np.inf), "upper": np.full(n, np.inf)}
+        return cls(kp, kd, **{**given, **others})
+
+    @property
+    def limited(self) -> list[int]:
+        """Numbers of the joints with dry friction or stops, which have a row of impulses each."""
+        return [
+            k
+            for k, (friction, low, high) in enumerate(zip(self.friction, self.lower, self.upper, strict=True))
+            if not (isinstance(friction, float | int) and friction == 0.0)
+            or np.isfinite(low)
+            or np.isfinite(high)
+        ]
 
 
 @dataclass(frozen=True)
@@ -123,33 +156,39 @@ def contact_step(
     v: Array,
     target: Array,
     impulses: Array,
+    friction: Sequence[Any] | Array,
     repeat: Repeat = repeat_numbers,
     *,
     regrouped: Mechanism | None = None,
 ) -> Numbers:
-    """Return q (nq,), v (nv,), `impulses` (3 n,) [N s] and the largest `residual` (1,) [m/s] after a step.
+    """Return q (nq,), v (nv,), `impulses` (m,) [N s or N m s] and the largest `residual` (1,) [m/s] after a
+    step.
 
     The length of the step is `h` [s]. `target` (n joints,) are positions; `impulses` are those of the step
-    before, normal and tangents of each sphere. `regrouped` is the mechanism with base parameters
+    before: normal and tangents of each contact, then those of the joints with dry friction or stops.
+    `friction` has a coefficient for each contact. `regrouped` is the mechanism with base parameters
     (`dynx.rbd.base_parameters`), which take fewer operations for the bias torque. The residual is the largest
     violation of the laws of contact.
     """
     base, last = mechanism.nv - len(mechanism.bodies), mechanism.nv - 1
     M = mass_matrix(mechanism, q)
     bias = bias_torque(mechanism if regrouped is None else regrouped, q, v)
-    rates = v[base:]
+    positions, rates = q[len(q) - len(mechanism.bodies) :], v[base:]
     rows, gaps = contact_rows(mechanism, spheres, q)
-    motors, stiffness = motor_law(joints, h, q[len(q) - len(rates) :], rates, target)
+    motors, stiffness = motor_law(joints, h, positions, rates, target)
     others, added = -bias, joints.armature + h * joints.damping
-    others[base:] = others[base:] - joints.damping * rates
+    springs = joints.stiffness * (joints.reference - positions)
+    others[base:] = others[base:] - joints.damping * rates + springs
 
     def factors(stiffness: Array) -> tuple[list[dict[int, Array]], list[Array]]:
         diagonal = np.concatenate([np.zeros(base), added + stiffness])
         return factorize_mass_matrix(mechanism, M + np.diag(diagonal))
 
+    limited = joints.limited
+    joint_rows: list[SparseRow] = [{last - base - k: np.array(1.0)[()]} for k in limited]
     if joints.max_torque is not None:
         pushed = others.astype(object)
-        for row, impulse in zip(rows, impulses, strict=True):
+        for row, impulse in zip([*rows, *joint_rows], impulses, strict=True):
             for k, each in row.items():
                 pushed[last - k] = pushed[last - k] + each * (impulse / h)
         pushed[base:] = pushed[base:] + motors
@@ -159,27 +198,39 @@ def contact_step(
     rest = eliminate_tips(L, np.concatenate([others[:base], motors + others[base:]]))
     # The velocity at the end is v + L^-T u.
     u = [h * each / pivot for each, pivot in zip(rest, D, strict=True)]
+    contacts = len(gaps)
+    rows += joint_rows
     eliminated = eliminate_rows(L, D, rows)
-    moved = _in_fixed_axes(mechanism, v, h)
+    moved = floating_end_velocity(v, 0.0 * v, h, mechanism.root_center) if mechanism.floating else v
     c: list[Any] = []
-    for i, (row, eliminated_row) in enumerate(zip(rows, eliminated.Y, strict=True)):
+    for row, eliminated_row in zip(rows, eliminated.Y, strict=True):
         terms = [each * moved[last - k] for k, each in row.items()]
         terms += [each * u[k] for k, each in eliminated_row.items()]
-        if i % 3 == 0:
-            gap = gaps[i // 3]
-            terms.append(maximum(gap / h, maximum(gap * (RECOVERY / h), -MAX_RECOVERY_SPEED)))
         c.append(sum(terms[1:], terms[0]))
-    impulses, residual = _contact_impulses(spheres, sweeps, eliminated, _objects(c), impulses, repeat)
-    for solved_row, impulse in zip(eliminated.Z, impulses, strict=True):
-        for k, each in solved_row.items():
-            u[k] = u[k] + each * impulse
-    a = substitute_back(L, u) / h
+    opening = [opening_velocity(gap, h) for gap in gaps]
+    for k, each in enumerate(opening):
+        c[3 * k] = c[3 * k] + each
+    blocks = blocks_of(eliminated, contacts, len(limited))
+    bounds = [_bounds(joints, k, positions[k], h) for k in limited]
+    solved, w = _solved_impulses(blocks, sweeps, c, list(friction), bounds, impulses, repeat)
+    for k, each in enumerate(opening):
+        w[k] = w[k] - each
+    extra = _displacement(blocks, sweeps, L, eliminated, gaps, bounds, w, h, repeat)
+    changes = all_velocities(eliminated, range(len(rows)), list(solved["impulses"]), len(L))
+    end = moved + substitute_back(L, [a + b for a, b in zip(u, changes, strict=True)])
     if mechanism.floating:
-        q, v = floating_step(q, v, a, h, mechanism.root_center)
+        q, v = floating_displacement(q, end + extra, end, h, mechanism.root_center)
     else:
-        v = v + h * a
-        q = q + h * v
-    return {"q": q, "v": v, "impulses": impulses, "residual": _objects([residual])}
+        q, v = q + h * (end + extra), end
+    first = len(q) - len(positions)
+    q = as_objects(list(q))
+    for k in limited:
+        # Rounding and the tolerance of the sweeps shall not carry a joint beyond a stop.
+        if np.isfinite(joints.lower[k]):
+            q[first + k] = maximum(q[first + k], minimum(joints.lower[k], positions[k]))
+        if np.isfinite(joints.upper[k]):
+            q[first + k] = minimum(q[first + k], maximum(joints.upper[k], positions[k]))
+    return {"q": q, "v": v, "impulses": solved["impulses"], "residual": solved["residual"]}
 
 
 def motor_law(
@@ -198,7 +249,17 @@ def _limited(limit: Array, motors: Array, stiffness: Array, a: Array) -> tuple[A
     for b, K, most, wanted in zip(motors, stiffness, limit, motors - stiffness * a, strict=True):
         inside, held = less(abs(wanted), most), minimum(maximum(wanted, -most), most)
         found.append((select(inside, b, held), select(inside, K, 0.0)))
-    return _objects([b for b, _ in found]), _objects([K for _, K in found])
+    return as_objects([b for b, _ in found]), as_objects([K for _, K in found])
+
+
+def _bounds(joints: ServoJoints, k: int, position: Any, h: float) -> JointBounds:
+    """Return the law of joint k in a step; one that is beyond a stop may not move further."""
+    low, high = -np.inf, np.inf
+    if np.isfinite(joints.lower[k]):
+        low = -opening_velocity(position - joints.lower[k], h)
+    if np.isfinite(joints.upper[k]):
+        high = opening_velocity(joints.upper[k] - position, h)
+    return JointBounds(h * joints.friction[k], low, high)
 
 
 def contact_rows(
@@ -230,8 +291,10 @@ def contact_rows(
     for number, radius in zip(spheres.frames, spheres.radii, strict=True):
         frame = mechanism.frames[number]
         center = p[frame.body] + rotate(R[frame.body], frame.p)
-        point = center - radius * axes[0]
-        gaps.append(height + axes[0].dot(center) - radius)
+        gap = height + axes[0].dot(center) - radius
+        gaps.append(gap)
+        # The impulses act in the middle between the surfaces.
+        point = center - (radius + 0.5 * gap) * axes[0]
         columns = {}
         for k in ancestry(mechanism, frame.body):
             axis = rotate(R[k], bodies[k].axis)
@@ -246,44 +309,88 @@ def contact_rows(
     return rows, gaps
 
 
-def _in_fixed_axes(mechanism: Mechanism, v: Array, h: float) -> Array:
-    """Return v (nv,), with a base's velocity as it would be after a step without acceleration of its
-    components, in axes that do not rotate with the base."""
-    if not mechanism.floating:
-        return v
-    omega = v[3:6]
-    turned = cross(omega, v[:3]) + cross(omega, cross(omega, mechanism.root_center))
-    return np.concatenate([v[:3] + h * turned, v[3:]])
-
-
-def _contact_impulses(
-    spheres: SpheresOnPlane,
+def _solved_impulses(
+    blocks: Sequence[Block],
     sweeps: Sweeps,
-    eliminated: EliminatedRows,
-    c: Array,
+    c: list[Any],
+    friction: Sequence[Any],
+    bounds: Sequence[JointBounds],
     impulses: Array,
     repeat: Repeat,
-) -> tuple[Array, Any]:
-    """Return the impulses (m,) for velocities c (m,) without impulses, and the largest residual [m/s]."""
-    sets = spheres.sets
-    G = eliminated.delassus_matrix()
-    g = scales(sets, G)
-    limits, floors = [spheres.friction] * len(sets.disks), [0.0] * sets.size
+) -> tuple[Numbers, list[Any]]:
+    """Return `impulses` (m,) for velocities c (m,) without impulses and the largest `residual` (1,) [m/s];
+    and the velocity of each block's first row."""
+    start = impulse_velocities(blocks, list(impulses))
+    places = sorted(start)
 
     def next_state(state: Numbers) -> Numbers:
-        x, w, change = state["impulses"], state["velocities"], 0.0
+        x, u = list(state["impulses"]), dict(zip(places, state["shared"], strict=True))
+        change: Any = 0.0
         for _ in range(SWEEPS_PER_TEST):
-            x, w, change = sweep(sets, G, g, limits, floors, x, w)
+            u, x, change = block_sweep(blocks, c, friction, bounds, u, x)
         goes_on = less(sweeps.tolerance, change)
-        return {"impulses": x, "velocities": w, "goes_on": _objects([goes_on])}
+        return {
+            "impulses": as_objects(x),
+            "shared": as_objects([u[k] for k in places]),
+            "goes_on": as_objects([goes_on]),
+        }
 
-    start = {"impulses": impulses, "velocities": c + G @ impulses, "goes_on": _objects([1.0])}
-    state = repeat(next_state, start, -(-sweeps.most // SWEEPS_PER_TEST))
-    found = residuals(sets, g, limits, floors, state["impulses"], state["velocities"])
-    return state["impulses"], found.largest
+    first = {
+        "impulses": impulses,
+        "shared": as_objects([start[k] for k in places]),
+        "goes_on": as_objects([1.0]),
+    }
+    state = repeat(next_state, first, -(-sweeps.most // SWEEPS_PER_TEST))
+    shared: Velocities = dict(zip(places, state["shared"], strict=True))
+    x = list(state["impulses"])
+    residual, w = block_residual(blocks, c, friction, bounds, shared, x)
+    found = {"impulses": state["impulses"], "residual": as_objects([residual])}
+    return found, [each[0] for each in w]
 
 
-def _objects(numbers: list[Any]) -> Array:
-    found = np.empty(len(numbers), dtype=object)
-    found[:] = numbers
-    return found
+def _displacement(
+    blocks: Sequence[Block],
+    sweeps: Sweeps,
+    L: list[dict[int, Array]],
+    eliminated: EliminatedRows,
+    gaps: Sequence[Any],
+    bounds: Sequence[JointBounds],
+    w: Sequence[Any],
+    h: float,
+    repeat: Repeat,
+) -> Array:
+    """Return the velocity (nv,) that a step adds in its displacement to take back overlaps.
+
+    `w` are the velocities of each block's first row at the end of the step.
+    """
+    wanted = [displacement_velocity(gap, each, h) for gap, each in zip(gaps, w, strict=False)]
+    ranges = [
+        (minimum(law.low - each, 0.0), maximum(law.high - each, 0.0))
+        for law, each in zip(bounds, w[len(gaps) :], strict=True)
+    ]
+    deepest: Any = 0.0
+    for gap in gaps:
+        deepest = maximum(deepest, -gap)
+    places = sorted({place for block in blocks for place in block.Z[0]})
+    rows = [block.rows[0] for block in blocks]
+
+    def next_state(state: Numbers) -> Numbers:
+        y, u = list(state["impulses"]), dict(zip(places, state["shared"], strict=True))
+        change: Any = 0.0
+        for _ in range(DISPLACEMENT_SWEEPS):
+            u, y, change = displacement_sweep(blocks, wanted, ranges, u, y)
+        entries = all_velocities(eliminated, rows, y, len(L))
+        return {
+            "impulses": as_objects(y),
+            "shared": as_objects([u[k] for k in places]),
+            "velocity": substitute_back(L, entries),
+            "goes_on": as_objects([less(sweeps.tolerance, change)]),
+        }
+
+    first = {
+        "impulses": as_objects([0.0] * len(blocks)),
+        "shared": as_objects([0.0] * len(places)),
+        "velocity": as_objects([0.0] * len(L)),
+        "goes_on": as_objects([less(NEGLIGIBLE, deepest)]),
+    }
+    return repeat(next_state, first, -(-sweeps.most // DISPLACEMENT_SWEEPS))["velocity"]

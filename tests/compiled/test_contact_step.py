@@ -14,9 +14,9 @@ from dynx.compiled.contact_step import contact_step_text
 from dynx.compiled.step import compiled
 from dynx.errors import UnknownNameError, UnsupportedFeatureError
 from dynx.model import Model
-from dynx.rbd.constraints import solve
+from dynx.rbd.constraints import ConstraintSets, Disk, displacement_velocity, opening_velocity, solve
 from dynx.rbd.contact_step import ServoJoints, SpheresOnPlane, Sweeps, contact_step
-from dynx.rbd.integration import SemiImplicitEuler
+from dynx.rbd.displacement import floating_displacement, floating_end_velocity
 from dynx.spatial.scalar import Floats
 from tests.rbd.exact import exact_mechanism, exactly, fifty_digits
 
@@ -72,22 +72,26 @@ def dense_step(q: Floats, v: Floats, target: Floats) -> tuple[Floats, Floats, Fl
     rows, gaps = [], []
     for foot in FEET:
         T = robot.forward_kinematics(q, foot)
-        point = T[:3, :3].T @ np.array([0.0, 0.0, -RADIUS])
+        gap = T[2, 3] - RADIUS
+        point = T[:3, :3].T @ np.array([0.0, 0.0, -RADIUS - 0.5 * gap])
         J = robot.jacobian(q, foot, point=point)[:3]
         rows.append(J[[2, 0, 1]])
-        gaps.append(T[2, 3] - RADIUS)
+        gaps.append(gap)
     J = np.concatenate(rows)
     # The velocity of the base's origin in axes that do not rotate, from its components in the base's axes.
-    w, center = v[3:6], model.mechanism.root_center
-    turned = np.cross(w, v[:3]) + np.cross(w, np.cross(w, center))
-    moved = np.concatenate([v[:3] + H * turned, v[3:]])
-    c = J @ (moved + H * free)
-    gap = np.array(gaps)
-    c[::3] += np.maximum(gap / H, np.maximum(0.2 * gap / H, -0.1))
-    sets = SpheresOnPlane(tuple(range(4)), (RADIUS,) * 4, FRICTION).sets
-    found = solve(sets, J @ np.linalg.solve(M, J.T), c, np.full(4, FRICTION))
-    a = free + np.linalg.solve(M, J.T @ found.impulses) / H
-    q, v, _ = SemiImplicitEuler(model, H).moved(q, v, a)
+    center = model.mechanism.root_center
+    u = floating_end_velocity(v, free, H, center)
+    c = J @ u
+    c[::3] += [opening_velocity(gap, H) for gap in gaps]
+    disks = tuple(Disk((3 * k + 1, 3 * k + 2), 3 * k) for k in range(4))
+    sets = ConstraintSets(12, unilateral=(0, 3, 6, 9), disks=disks)
+    G = J @ np.linalg.solve(M, J.T)
+    found = solve(sets, G, c, np.full(4, FRICTION))
+    w = u + np.linalg.solve(M, J.T @ found.impulses)
+    wanted = np.zeros(12)
+    wanted[::3] = [displacement_velocity(gap, each, H) for gap, each in zip(gaps, (J @ w)[::3], strict=True)]
+    back = solve(sets, G, wanted, np.zeros(4)).impulses
+    q, v = floating_displacement(q, w + np.linalg.solve(M, J.T @ back), w, H, center)
     return q, v, found.impulses
 
 
@@ -112,13 +116,12 @@ def test_floats_and_fifty_digits_agree_with_the_kernel() -> None:
     on_floats = text.function(**dict(zip(names, (each[0] for each in given), strict=True)))
     for mine, wanted in zip(found, on_floats.values(), strict=True):
         np.testing.assert_allclose(mine[0], np.asarray(wanted, dtype=float), rtol=0.0, atol=1e-9)
-    touching = SpheresOnPlane(tuple(map(model.frame_index, FEET)), (RADIUS,) * 4, FRICTION)
-    zero = np.zeros(12)
-    joints = ServoJoints(np.full(12, KP), np.full(12, KD), zero, zero)
+    touching = SpheresOnPlane(tuple(map(model.frame_index, FEET)), (RADIUS,) * 4)
+    joints = ServoJoints.of(np.full(12, KP), np.full(12, KD))
     with fifty_digits():
         q, v, target, impulses = (exactly(each[0]) for each in given)
         found_exactly = contact_step(
-            exact_mechanism(model), joints, touching, TIGHT, H, q, v, target, impulses
+            exact_mechanism(model), joints, touching, TIGHT, H, q, v, target, impulses, [FRICTION] * 4
         )
         for mine, wanted in zip(found, found_exactly.values(), strict=True):
             np.testing.assert_allclose(mine[0], np.asarray(wanted, dtype=float), rtol=0.0, atol=1e-9)

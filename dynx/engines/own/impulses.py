@@ -7,7 +7,7 @@ on both bodies are opposite.
 
 **Gaps.** A contact whose gap phi may close in the step has the normal velocity w >= -phi / h: bodies touch at
 the end of the step, not beyond. Where they overlap, w >= 0. A displacement without velocity takes back a part
-of each overlap, and each error of a constraint, so that errors of positions make no kinetic energy.
+of each overlap, and each error of a constraint (`dynx.rbd.constraints`).
 
 **Impacts.** A contact with restitution that closes in the step meets at the fraction s of it, with the
 velocity that the free motion has then. Its coefficient of restitution is reduced to the ratio of this
@@ -27,19 +27,21 @@ from numpy.typing import NDArray
 
 from dynx.engines.own.parts import OwnRobot
 from dynx.engines.own.touching import MARGIN, REACH, PossibleContact
-from dynx.rbd.constraints import TOLERANCE, ConstraintSets, Disk, Solution, rebound, solve
+from dynx.rbd.constraints import (
+    MAX_CORRECTION_SPEED,
+    NEGLIGIBLE,
+    TOLERANCE,
+    ConstraintSets,
+    Disk,
+    Solution,
+    displacement_velocity,
+    opening_velocity,
+    rebound,
+    solve,
+)
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, quat_from_rotation, quat_log, skew
 from dynx.steppers.layout import ConstraintLayout, Owner
-
-CORRECTION = 0.2
-"""Part of an overlap that one step takes back; of an error of a constraint it takes back all."""
-
-MAX_CORRECTION_SPEED = 1.0
-"""Largest speed [m/s or rad/s] at which a step takes back an overlap or an error of a constraint."""
-
-NEGLIGIBLE = 1e-10
-"""Overlap and error of a constraint [m or rad] that count as none."""
 
 NEGLIGIBLE_REBOUND = 1e-9
 """Speed after an impact [m/s] that counts as none."""
@@ -250,10 +252,8 @@ class Island:
         start = self._start(warm, keys, present, D, len(J))
         normals = np.array(sets.unilateral[:n], dtype=np.intp)
         opening = np.zeros(len(J))
-        # Gaps of touching parts are rounding. With them the points of a face would have no common solution,
-        # and the impulses would jump from three points to others in every step.
-        ways = np.concatenate([gaps, limit_gaps])
-        opening[list(sets.unilateral)] = np.where(ways > NEGLIGIBLE, ways, 0.0) / h
+        ways = [*gaps.tolist(), *limit_gaps.tolist()]
+        opening[list(sets.unilateral)] = [opening_velocity(gap, h) for gap in ways]
         opening[list(sets.free)] = biases
         c = J @ free
         first = solve(sets, G, c + opening, numbers, start=start)
@@ -320,9 +320,8 @@ class Island:
         if not overlaps and not (np.abs(errors) > NEGLIGIBLE).any():
             return None
         wanted = np.zeros(sets.size)
-        after = gaps / h + velocities[normals]
-        back = np.maximum(CORRECTION * gaps / h, -MAX_CORRECTION_SPEED)
-        wanted[normals] = np.where(gaps < 0.0, back + np.maximum(velocities[normals], 0.0), after)
+        pairs = zip(gaps.tolist(), velocities[normals].tolist(), strict=True)
+        wanted[normals] = [displacement_velocity(gap, w, h) for gap, w in pairs]
         rows = list(sets.unilateral[len(normals) :])
         wanted[rows] = np.maximum(limit_gaps / h + velocities[rows], 0.0)
         wanted[list(sets.free)] = np.clip(errors / h, -MAX_CORRECTION_SPEED, MAX_CORRECTION_SPEED)

@@ -1,0 +1,285 @@
+"""Sweeps over contacts and joints on the factors of a tree, without a Delassus matrix, for any scalar.
+
+A *block* is a contact, with a normal row and two tangents, or a joint, with the row of its coordinate. Its
+velocity is w = c + Y u, and its impulses x change u by Z' x (`dynx.rbd.eliminated_rows`). A visit solves the
+block for given others and changes u. Entries of u that no other block has are not kept: they are a product
+with the block's own impulses. So a visit takes operations for the joints that two blocks have in common,
+and rows of many blocks take far fewer than the Delassus matrix of all.
+
+The laws are those of `dynx.rbd.constraints`. A joint with dry friction r and stops may have the velocities
+low <= w <= high in the step, where low <= 0 <= high. Its impulse is at most r against the motion between
+them, and any at a stop that exceeds r against it. That is a maximal monotone graph, of which a visit finds
+the one point on the line w = z + g x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dynx.rbd.constraints import TINY, disk_share, largest_eigenvalue, norm
+from dynx.rbd.eliminated_rows import EliminatedRows
+from dynx.spatial.scalar import Array, maximum, minimum
+
+INNER = 2
+"""Solutions of normal and tangents one after the other in a visit of a contact. Two of them in a visit
+reduce the residual as much as two visits, because the rows of a point are coupled more than two points."""
+
+Vector = list[Any]
+Velocities = dict[int, Any]
+"""Entries of u by their place in the order of elimination."""
+
+
+class JointBounds(NamedTuple):
+    """Law of a joint in a step."""
+
+    friction: Any
+    """Largest impulse of dry friction [N m s or N s]."""
+    low: Any
+    """Smallest velocity [rad/s or m/s], at most 0; minus infinity without a stop."""
+    high: Any
+    """Largest velocity [rad/s or m/s], at least 0; infinity without a stop."""
+
+
+@dataclass
+class Block:
+    """Rows of a contact (3) or of a joint (1)."""
+
+    rows: list[int]
+    Y: list[Velocities]
+    """Entries of the rows that other blocks have too."""
+    Z: list[Velocities]
+    own: list[Vector]
+    """Part of the block of the Delassus matrix from entries that no other block has."""
+    G: list[Vector]
+    """Block of the Delassus matrix."""
+    scales: Vector
+    """Largest eigenvalue of G for the normal and for the tangents, or of a joint's row."""
+    inverse: Vector
+    """1 / scales."""
+
+
+def blocks_of(eliminated: EliminatedRows, contacts: int, joints: int) -> list[Block]:
+    """Return the blocks of rows: 3 for each contact, then one for each joint."""
+    rows = [[3 * k, 3 * k + 1, 3 * k + 2] for k in range(contacts)]
+    rows += [[3 * contacts + k] for k in range(joints)]
+    count: dict[int, int] = {}
+    for each in rows:
+        for place in {place for row in each for place in eliminated.Y[row]}:
+            count[place] = count.get(place, 0) + 1
+    return [_block(eliminated, each, {place for place, n in count.items() if n > 1}) for each in rows]
+
+
+def _block(eliminated: EliminatedRows, rows: list[int], shared: set[int]) -> Block:
+    def shared_part(row: Velocities) -> Velocities:
+        return {place: entry for place, entry in row.items() if place in shared}
+
+    G = [[0.0] * len(rows) for _ in rows]
+    own = [[0.0] * len(rows) for _ in rows]
+    for a, i in enumerate(rows):
+        for b, j in enumerate(rows[: a + 1]):
+            common: Any = 0.0
+            alone: Any = 0.0
+            for place, entry in eliminated.Z[i].items():
+                if place in eliminated.Y[j]:
+                    product = entry * eliminated.Y[j][place]
+                    if place in shared:
+                        common = common + product
+                    else:
+                        alone = alone + product
+            own[a][b] = own[b][a] = alone
+            G[a][b] = G[b][a] = common + alone
+    scales = [G[0][0] + TINY]
+    if len(rows) == 3:
+        scales.append(largest_eigenvalue(G[1][1], G[2][2], G[1][2]) + TINY)
+    Y, Z = ([shared_part(each[row]) for row in rows] for each in (eliminated.Y, eliminated.Z))
+    return Block(rows, Y, Z, own, G, scales, [1.0 / each for each in scales])
+
+
+def impulse_velocities(blocks: Sequence[Block], x: Vector) -> Velocities:
+    """Return the entries of u that blocks have in common, for impulses x (m,)."""
+    u: Velocities = {}
+    for block in blocks:
+        _add(u, block.Z, [x[row] for row in block.rows])
+    return u
+
+
+def _add(u: Velocities, Z: Sequence[Velocities], steps: Sequence[Any]) -> None:
+    for row, step in zip(Z, steps, strict=True):
+        for place, entry in row.items():
+            u[place] = u.get(place, 0.0) + entry * step
+
+
+def block_velocity(block: Block, c: Vector, u: Velocities, x: Vector) -> Vector:
+    """Return the velocities of a block's rows, for impulses x (m,) and the entries of u that belong to
+    them."""
+    found = []
+    for row, entries, own in zip(block.rows, block.Y, block.own, strict=True):
+        w = c[row]
+        for place, entry in entries.items():
+            w = w + entry * u[place]
+        for other, entry in zip(block.rows, own, strict=True):
+            w = w + entry * x[other]
+        found.append(w)
+    return found
+
+
+def block_sweep(
+    blocks: Sequence[Block],
+    c: Vector,
+    friction: Sequence[Any],
+    bounds: Sequence[JointBounds],
+    u: Velocities,
+    x: Vector,
+) -> tuple[Velocities, Vector, Any]:
+    """Visit every block once; return the entries of u, the impulses (m,) and the largest change [m/s].
+
+    `friction` has a coefficient for each contact, `bounds` the law of each joint. The change is that of an
+    impulse times the scale of its row.
+    """
+    u, x = dict(u), list(x)
+    change: Any = 0.0
+    for number, block in enumerate(blocks):
+        w = block_velocity(block, c, u, x)
+        held = [x[row] for row in block.rows]
+        if len(held) == 3:
+            new = _contact_impulses(block, friction[number], held, w)
+        else:
+            new = [_joint_impulse(block, bounds[number - len(friction)], held[0], w[0])]
+        steps = [a - b for a, b in zip(new, held, strict=True)]
+        _add(u, block.Z, steps)
+        for place, (row, step) in enumerate(zip(block.rows, steps, strict=True)):
+            x[row] = new[place]
+            change = maximum(change, abs(step) * block.scales[min(place, 1)])
+    return u, x, change
+
+
+def _contact_impulses(block: Block, mu: Any, x: Vector, w: Vector) -> Vector:
+    """Return the impulses of a contact for given others, after `INNER` solutions of its normal and its
+    tangents."""
+    (a, b, c), (_, d, e), (_, _, f) = block.G
+    of_normal, of_tangents = block.inverse
+    n, s, t = x
+    wn, ws, wt = w
+    for number in range(INNER):
+        last = number == INNER - 1
+        new = maximum(0.0, n - wn * of_normal)
+        step, n = new - n, new
+        ws, wt = ws + b * step, wt + c * step
+        ys, yt = s - ws * of_tangents, t - wt * of_tangents
+        share = disk_share(mu * n, [ys, yt])
+        ds, dt = share * ys - s, share * yt - t
+        s, t = share * ys, share * yt
+        if not last:
+            wn = wn + a * step + b * ds + c * dt
+            ws, wt = ws + d * ds + e * dt, wt + e * ds + f * dt
+    return [n, s, t]
+
+
+def _joint_impulse(block: Block, bounds: JointBounds, x: Any, w: Any) -> Any:
+    """Return the impulse of a joint for given others."""
+    g = block.scales[0]
+    free = w - g * x
+    held = _end_velocity(bounds, g, free)
+    return (held - free) * block.inverse[0]
+
+
+def _end_velocity(bounds: JointBounds, g: Any, free: Any) -> Any:
+    """Return the velocity of a joint that would have the velocity `free` without its impulse."""
+    most = g * bounds.friction
+    slowed = free - minimum(maximum(free, -most), most)
+    return minimum(maximum(slowed, bounds.low), bounds.high)
+
+
+def block_residual(
+    blocks: Sequence[Block],
+    c: Vector,
+    friction: Sequence[Any],
+    bounds: Sequence[JointBounds],
+    u: Velocities,
+    x: Vector,
+) -> tuple[Any, list[Vector]]:
+    """Return the largest violation of the laws [m/s or rad/s], and the velocities of each block's rows."""
+    worst: Any = 0.0
+    velocities = []
+    for number, block in enumerate(blocks):
+        w = block_velocity(block, c, u, x)
+        velocities.append(w)
+        held = [x[row] for row in block.rows]
+        if len(held) == 1:
+            g = block.scales[0]
+            law = _end_velocity(bounds[number - len(friction)], g, w[0] - g * held[0])
+            worst = maximum(worst, abs(law - w[0]))
+            continue
+        g_n, g_t = block.scales
+        radius = friction[number] * maximum(held[0], 0.0)
+        wanted = [y - v * block.inverse[1] for y, v in zip(held[1:], w[1:], strict=True)]
+        share = disk_share(radius, wanted)
+        missed = [y - share * z for y, z in zip(held[1:], wanted, strict=True)]
+        for each in (
+            -w[0],
+            abs(minimum(w[0], g_n * held[0])),
+            g_t * norm(missed),
+            g_t * (norm(held[1:]) - radius),
+        ):
+            worst = maximum(worst, each)
+    return worst, velocities
+
+
+# -- displacements ------------------------------------------------------------------------------------
+
+
+def displacement_sweep(
+    blocks: Sequence[Block],
+    wanted: Sequence[Any],
+    ranges: Sequence[tuple[Any, Any]],
+    u: Velocities,
+    y: Vector,
+) -> tuple[Velocities, Vector, Any]:
+    """Visit every block once for the displacement that takes back overlaps, without friction.
+
+    `wanted` has the velocity of each contact's normal without such impulses, which the displacement makes at
+    least 0; `ranges` the least and largest change of each joint's velocity. `u` and y (n,), an impulse for
+    each block, belong to the displacement alone. Returns both, and the largest change [m/s or rad/s].
+    """
+    u, y = dict(u), list(y)
+    change: Any = 0.0
+    for number, block in enumerate(blocks):
+        w = _first_velocity(block, u, y[number])
+        if len(block.rows) == 3:
+            new = maximum(0.0, y[number] - (wanted[number] + w) * block.inverse[0])
+        else:
+            least, most = ranges[number - len(wanted)]
+            free = w - block.scales[0] * y[number]
+            new = (minimum(maximum(free, least), most) - free) * block.inverse[0]
+        step = new - y[number]
+        _add(u, block.Z[:1], [step])
+        y[number] = new
+        change = maximum(change, abs(step) * block.scales[0])
+    return u, y, change
+
+
+def _first_velocity(block: Block, u: Velocities, y: Any) -> Any:
+    w = block.own[0][0] * y
+    for place, entry in block.Y[0].items():
+        w = w + entry * u[place]
+    return w
+
+
+def all_velocities(eliminated: EliminatedRows, rows: Sequence[int], x: Sequence[Any], size: int) -> Vector:
+    """Return u (size,) of impulses x on some rows; 0 where they have no entry."""
+    u: Vector = [0.0] * size
+    for row, impulse in zip(rows, x, strict=True):
+        for place, entry in eliminated.Z[row].items():
+            u[place] = u[place] + entry * impulse
+    return u
+
+
+def as_objects(numbers: Sequence[Any]) -> Array:
+    """Return numbers of any scalar as an array of objects."""
+    found = np.empty(len(numbers), dtype=object)
+    found[:] = numbers
+    return found
