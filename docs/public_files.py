@@ -91,7 +91,7 @@ On 28 November:
 
 All engines refuse two of the five refused files. The third file has no link, and the fourth has an
 expression in place of a number. The fifth file disables an element by `<!mesh ...>`, and all engines
-load this file. dynx now reads the fifth file, too. The unexplained difference is an error of 4e-12 in
+load this file. dynx now also reads the fifth file. The unexplained difference is an error of 4e-12 in
 PyBullet's forward dynamics. Its cause is rounding, because a base of 0.1 g carries 3 kg. dynx no longer
 reports this error as a difference.
 
