@@ -556,10 +556,10 @@ def summary(results: Sequence[PairResult]) -> str:
     effective = reinserted - sum(len(each.unreal) for each in results)
     return (
         f"Of {len(results)} pairs, both files describe the same robot in {words['same']} pairs, and "
-        f"different robots in {words['different']} pairs. Pairs that dynx refuses: {words['refused']}. Engines "
-        f"checked the reports of {len(judged_ones)} pairs. Pairs with a missed difference: "
-        f"{sum(map(missed, results))}. Of {reinserted} reinserted elements, {effective} change the "
-        "robot in Pinocchio."
+        f"different robots in {words['different']} pairs. Pairs that dynx refuses: {words['refused']}. "
+        f"Engines checked the reports of {len(judged_ones)} pairs. Pairs with a missed difference: "
+        f"{sum(map(missed, results))}. Of {reinserted} reinserted elements, {effective} change the robot in "
+        "Pinocchio."
     )
 
 
