@@ -13,10 +13,21 @@ from dynx.compiled.step import StepText
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.model import Model
 from dynx.model.ball_joints import refuse_ball_joints
+from dynx.model.geometry import Plane
 from dynx.rbd.base_parameters import regroup_inertias
-from dynx.rbd.contact_step import ServoJoints, SpheresOnPlane, Sweeps, contact_step
+from dynx.rbd.contact_geometry import plane_point_count
+from dynx.rbd.contact_step import (
+    LEVEL,
+    FramedShape,
+    ServoJoints,
+    ShapesOnPlane,
+    SpheresOnPlane,
+    Sweeps,
+    contact_step,
+)
 from dynx.spatial.scalar import Array, Floats
-from dynx.steppers.layout import stop_positions
+from dynx.steppers.layout import Layout, stop_positions
+from dynx.steppers.material import contact_material
 
 INPUTS = ("friction", "gravity", "kp", "kd", "max_torque")
 """Numbers that may be inputs of the kernel."""
@@ -24,14 +35,14 @@ INPUTS = ("friction", "gravity", "kp", "kd", "max_torque")
 
 def contact_step_text(
     model: Model,
-    spheres: Mapping[str, float],
+    shapes: Mapping[str, float] | ShapesOnPlane,
     *,
     h: float,
     kp: Floats | float,
     kd: Floats | float,
-    friction: float,
+    friction: float = 1.0,
     max_torque: Floats | float | None = None,
-    axes: Sequence[tuple[float, float, float]] = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+    axes: Sequence[tuple[float, float, float]] | None = None,
     offset: float = 0.0,
     sweeps: Sweeps | None = None,
     joint_limits: bool = False,
@@ -39,15 +50,16 @@ def contact_step_text(
 ) -> StepText:
     """Return the text of a step of `h` [s] for `dynx.compiled.step`.
 
-    `spheres` has the radius [m] of a sphere at the origin of each frame, `kp` and `kd` (n joints,) are the
-    gains of the motors, `max_torque` (n joints,) their largest torques [N m or N]. Inputs and outputs are q
-    (nq,), v (nv,) and impulses (m,): three for each sphere, normal and tangents, then one for each joint with
-    dry friction or, with `joint_limits`, with a limit. Another input is target (n joints,), another output
-    residual (1,). `axes` and `offset` are those of the plane (`SpheresOnPlane`). Damping, dry friction,
-    armature and springs of the joints are in the step.
+    `shapes` are those that may touch a plane (`shapes_on_plane` returns those of a scene), or the radii [m]
+    of spheres at the origins of frames, with `friction`, and `axes` and `offset` of the plane. `kp` and `kd`
+    (n joints,) are the gains of the motors, `max_torque` (n joints,) their largest torques [N m or N]. Inputs
+    and outputs are q (nq,), v (nv,) and impulses (m,): three for each contact point, normal and tangents,
+    then one for each joint with dry friction or, with `joint_limits`, with a limit. Another input is target
+    (n joints,), another output residual (1,). Damping, dry friction, armature and springs of the joints are
+    in the step.
 
     Numbers named in `inputs` are inputs of the kernel instead of constants, so that they may differ from lane
-    to lane: "friction" (a coefficient for each sphere), "gravity" (3,), "kp", "kd" and "max_torque"
+    to lane: "friction" (a coefficient for each shape), "gravity" (3,), "kp", "kd" and "max_torque"
     (n joints,).
 
     Raises UnsupportedFeatureError for a robot with mimic joints or ball joints, UnknownNameError for an
@@ -65,37 +77,96 @@ def contact_step_text(
     n = len(dynamics)
     mechanism = simplify_mechanism(model.mechanism)
     regrouped = regroup_inertias(mechanism)
-    stops = dict(zip(("lower", "upper"), stop_positions(model), strict=True)) if joint_limits else {}
-    joints = ServoJoints.of(
+    joints = ServoJoints(
         np.full(n, kp),
         np.full(n, kd),
-        damping=np.array([each.damping for each in dynamics]),
-        armature=np.array([each.armature for each in dynamics]),
-        friction=np.array([each.friction for each in dynamics]),
-        stiffness=np.array([each.stiffness for each in dynamics]),
-        reference=np.array([each.spring_reference for each in dynamics]),
-        max_torque=None if max_torque is None else np.full(n, max_torque),
-        **stops,
+        np.array([each.damping for each in dynamics]),
+        np.array([each.armature for each in dynamics]),
+        None if max_torque is None else np.full(n, max_torque),
+        np.array([each.friction for each in dynamics]),
+        (
+            np.array([each.stiffness for each in dynamics]),
+            np.array([each.spring_reference for each in dynamics]),
+        ),
+        stop_positions(model) if joint_limits else None,
     )
-    touching = SpheresOnPlane(
-        tuple(model.frame_index(name) for name in spheres), tuple(spheres.values()), tuple(axes), offset
-    )
-    limits = Sweeps() if sweeps is None else sweeps
+    if isinstance(shapes, ShapesOnPlane):
+        touching = shapes
+    else:
+        frames = tuple(model.frame_index(name) for name in shapes)
+        radii, level = tuple(shapes.values()), LEVEL if axes is None else tuple(axes)
+        touching = SpheresOnPlane(frames, radii, friction, level, offset).as_shapes
+    bounds = Sweeps() if sweeps is None else sweeps
     sizes = {
         "q": model.nq,
         "v": model.nv,
         "target": n,
-        "impulses": 3 * len(spheres) + len(joints.limited),
-        **{name: {"friction": len(spheres), "gravity": 3}.get(name, n) for name in inputs},
+        "impulses": 3 * sum(touching.counts) + len(joints.limited),
+        **{name: {"friction": len(touching.shapes), "gravity": 3}.get(name, n) for name in inputs},
     }
 
     def function(**arrays: Any) -> Mapping[str, Array]:
         given = {name: arrays.pop(name) for name in inputs}
-        arrays["friction"] = given.pop("friction", [friction] * len(spheres))
-        moved, fewer = mechanism, regrouped
+        moved, fewer, rough = mechanism, regrouped, touching
         if "gravity" in given:
             gravity = given.pop("gravity")
             moved, fewer = (replace(each, gravity=gravity) for each in (mechanism, regrouped))
-        return contact_step(moved, replace(joints, **given), touching, limits, h, **arrays, regrouped=fewer)
+        if "friction" in given:
+            pairs = zip(touching.shapes, given.pop("friction"), strict=True)
+            rough = replace(touching, shapes=tuple(each._replace(friction=mu) for each, mu in pairs))
+        return contact_step(moved, replace(joints, **given), rough, bounds, h, **arrays, regrouped=fewer)
 
     return StepText(function, sizes, "the step with contacts cannot be compiled", repeats=True)
+
+
+def shapes_on_plane(layout: Layout, *, deepest: bool = False) -> ShapesOnPlane:
+    """Return the shapes of the only robot of a scene that may touch its only plane.
+
+    Of each shape all contact points count, or the `deepest` alone; of a sphere both are the same. Raises
+    UnsupportedFeatureError, naming the part, for a scene with other contacts: of moved bodies, of links with
+    one another, with another ground than one plane, with restitution, torsional or rolling friction, and of
+    shapes that have no such points.
+    """
+    if len(layout.robots) != 1:
+        raise UnsupportedFeatureError(f"a kernel steps one robot; {layout.name} has {len(layout.robots)}")
+    frames = layout.robots[0].model.mechanism
+    found: list[FramedShape] = []
+    plane: Floats | None = None
+    for i, j in np.argwhere(np.triu(layout.collides)):
+        own, other = layout.colliders[i], layout.colliders[j]
+        if own.owner.robot is None:
+            own, other = other, own
+        if own.owner.robot is None or not layout.is_fixed(other.owner):
+            raise UnsupportedFeatureError(
+                f"{own.name} and {other.name} may touch; a kernel has contacts of the robot with the ground "
+                "only"
+            )
+        if layout.is_fixed(own.owner):
+            continue
+        for ground in other.shapes:
+            kind = type(ground.shape).__name__
+            if not isinstance(ground.shape, Plane):
+                raise UnsupportedFeatureError(f"{other.name} is a {kind}; the ground of a kernel is a plane")
+            if plane is not None and not np.array_equal(plane, ground.T):
+                raise UnsupportedFeatureError(f"{other.name} is a second plane; a kernel has one")
+            plane = ground.T
+        material = contact_material(own.material, other.material)
+        for name in ("restitution", "torsional_friction", "rolling_friction"):
+            if getattr(material, name):
+                raise UnsupportedFeatureError(
+                    f"{own.name} has {name.replace('_', ' ')} on {other.name}, which a kernel does not have"
+                )
+        number = frames.body_frames[own.owner.body + 1]
+        frame = frames.frames[number]
+        for placed in own.shapes:
+            try:
+                plane_point_count(placed.shape)
+            except ArgumentError as error:
+                raise UnsupportedFeatureError(f"{own.name} cannot touch the ground: {error}") from None
+            R = frame.R.T @ placed.T[:3, :3]
+            p = frame.R.T @ (placed.T[:3, 3] - frame.p)
+            found.append(FramedShape(number, placed.shape, R, p, material.friction, deepest))
+    if plane is None:
+        return ShapesOnPlane(())
+    axes = tuple(tuple(plane[:3, k].tolist()) for k in (2, 0, 1))
+    return ShapesOnPlane(tuple(found), axes, float(plane[:3, 2] @ plane[:3, 3]))

@@ -15,6 +15,7 @@ import numpy as np
 from dynx.errors import ArgumentError, shown
 from dynx.model.geometry import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 from dynx.spatial.scalar import Array, Floats, less, maximum, minimum, select, sqrt
+from dynx.spatial.so3 import rotate
 
 MIN_SQUARE = 1e-30
 """Square of a length [m^2] or a sine that is added where a direction may vanish: its place is then any."""
@@ -74,6 +75,147 @@ def ball_points(shape: Shape) -> BallPoints:
         return BallPoints(vertices, 0.0)
     kind = type(shape).__name__
     raise ArgumentError(f"a shape is {kind}; wanted a Sphere, Capsule, Box, Cylinder or Mesh")
+
+
+def plane_point_count(shape: Shape, *, deepest: bool = False) -> int:
+    """Return the number of `plane_points` of a shape.
+
+    Raises ArgumentError for a mesh whose hull has more than `MAX_POINTS` vertices, and for shapes that are
+    no Sphere, Capsule, Box, Cylinder or Mesh.
+    """
+    points = ball_points(shape).centers
+    if deepest or isinstance(shape, Sphere):
+        return 1
+    if isinstance(shape, Capsule):
+        return 2
+    return 6 if isinstance(shape, Cylinder) else min(len(points), 4)
+
+
+def plane_points(
+    shape: Shape, R: Array, center: Array, axes: Array, offset: Any, *, deepest: bool = False
+) -> list[tuple[Any, Array]]:
+    """Return the gaps [m] and points (3,) of a shape that may touch a half-space, or the `deepest` alone.
+
+    R (3, 3) and `center` (3,) are its pose; `axes` (3, 3) are the normal of the half-space and two tangents,
+    `offset` its distance from the origin. Of a sphere it is one point, of a capsule one below each end of its
+    axis, of a box the corners of the face that looks down most, of a cylinder four points of the lower rim
+    and the lowest of both rims, and of a hull with more than four vertices the lowest vertex of each quadrant
+    around its middle: those of `dynx.distance.contact_points`, before these are reduced to four.
+    """
+    normal = axes[0]
+    height = normal.dot(center) - offset
+    if isinstance(shape, Sphere):
+        return [(height - shape.radius, center - shape.radius * normal)]
+    columns = [R[:, k] for k in range(3)]
+    cosines = [column.dot(normal) for column in columns]
+    if isinstance(shape, Capsule):
+        return _capsule_points(shape, columns[2], cosines[2], center, height, normal, deepest)
+    if isinstance(shape, Box):
+        return _box_points(shape, columns, cosines, center, height, deepest)
+    if isinstance(shape, Cylinder):
+        z, half = columns[2], 0.5 * shape.length
+        down = half * select(less(0.0, cosines[2]), -1.0, 1.0)
+        low, up = center + down * z, center - down * z
+        points = [lowest_of_rim(low, z, shape.radius, normal)]
+        if not deepest:
+            points.append(lowest_of_rim(up, z, shape.radius, normal))
+            for column in columns[:2]:
+                points += [low + shape.radius * column, low - shape.radius * column]
+        return [(normal.dot(point) - offset, point) for point in points]
+    return _hull_points(ball_points(shape).centers, R, center, height, axes, deepest)
+
+
+def _capsule_points(
+    shape: Capsule, axis: Array, sine: Any, center: Array, height: Any, normal: Array, deepest: bool
+) -> list[tuple[Any, Array]]:
+    """Return the points of the surface straight below both ends of the axis."""
+    r, half = shape.radius, 0.5 * shape.length
+    low = height - half * abs(sine)
+    if deepest:
+        toward = half * select(less(0.0, sine), -1.0, 1.0)
+        return [(low - r, center + toward * axis - r * normal)]
+    steep, cosine = abs(sine), _root(maximum(1.0 - sine * sine, MIN_SQUARE))
+    along = 2.0 * half * cosine
+    # The surface below the upper end is that of the half ball of the lower end, or of the cylinder.
+    round_end = _root(maximum(r * r - along * along, 0.0))
+    reach = select(less(along, r * steep), round_end, (r - along * steep) / cosine)
+    found = []
+    for s in (-half, half):
+        gap = low - select(less(0.0, s * sine), reach, r)
+        found.append((gap, center + s * axis + (gap - (height + s * sine)) * normal))
+    return found
+
+
+def _box_points(
+    shape: Box, columns: list[Array], cosines: list[Any], center: Array, height: Any, deepest: bool
+) -> list[tuple[Any, Array]]:
+    """Return the corners of the face whose normal is nearest to straight down."""
+    halves = [0.5 * size for size in shape.size]
+    if deepest:
+        signs = [half * select(less(0.0, c), -1.0, 1.0) for half, c in zip(halves, cosines, strict=True)]
+        above, point = height, center
+        for s, column, c in zip(signs, columns, cosines, strict=True):
+            above, point = above + s * c, point + s * column
+        return [(above, point)]
+    steep = [abs(c) for c in cosines]
+    first = less(steep[1], steep[0]) * less(steep[2], steep[0])
+    second = less(steep[2], steep[1])
+
+    def chosen(a: Any, b: Any, c: Any) -> Any:
+        return select(first, a, select(second, b, c))
+
+    def edges(k: int) -> tuple[list[Any], Any]:
+        """Return half an edge along axis k as a vector, and its component along the normal."""
+        return [halves[k] * x for x in columns[k]], halves[k] * cosines[k]
+
+    (x, along_x), (y, along_y), (z, along_z) = edges(0), edges(1), edges(2)
+    down = [chosen(*each) for each in zip(x, y, z, strict=True)]
+    across = [chosen(*each) for each in zip(y, z, x, strict=True)]
+    other = [chosen(*each) for each in zip(z, x, y, strict=True)]
+    heights = [chosen(a, b, c) for a, b, c in ((along_x, along_y, along_z), (along_y, along_z, along_x))]
+    heights.append(chosen(along_z, along_x, along_y))
+    sign = select(less(0.0, heights[0]), -1.0, 1.0)
+    found = []
+    for s, t in ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)):
+        gap = height + sign * heights[0] + s * heights[1] + t * heights[2]
+        steps = [sign * a + s * b + t * c for a, b, c in zip(down, across, other, strict=True)]
+        found.append((gap, np.array([a + b for a, b in zip(center, steps, strict=True)])))
+    return found
+
+
+def _hull_points(
+    vertices: Floats, R: Array, center: Array, height: Any, axes: Array, deepest: bool
+) -> list[tuple[Any, Array]]:
+    """Return the lowest vertex of each quadrant around the middle, or of all."""
+    local = axes @ R
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    far = 4.0 * float(np.linalg.norm(vertices - middle, axis=1).max(initial=0.0))
+    lowered = [local[0].dot(vertex) for vertex in vertices]
+    if not deepest and len(vertices) <= 4:
+        pairs = zip(lowered, vertices, strict=True)
+        return [(height + above, center + rotate(R, vertex)) for above, vertex in pairs]
+    quadrants = [None] if deepest else [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
+    sides = [(local[1].dot(vertex - middle), local[2].dot(vertex - middle)) for vertex in vertices]
+    found = []
+    for quadrant in quadrants:
+        best: Any = None
+        for above, vertex, (u, v) in zip(lowered, vertices, sides, strict=True):
+            score = above
+            if quadrant is not None:
+                inside = less(0.0, quadrant[0] * u) * less(0.0, quadrant[1] * v)
+                score = above + (1.0 - inside) * far
+            if best is None:
+                best = [score, above, *vertex]
+                continue
+            lower = less(score, best[0])
+            pairs = zip([score, above, *vertex], best, strict=True)
+            best = [select(lower, new, old) for new, old in pairs]
+        found.append((height + best[1], center + rotate(R, np.array(best[2:]))))
+    return found
+
+
+def _root(x: Any) -> Any:
+    return sqrt(np.asarray([x]))[0]
 
 
 def ball_on_plane(center: Array, radius: Any, normal: Array, offset: Any) -> SurfaceGap:
@@ -165,7 +307,7 @@ def capsule_on_capsule(
 
 
 def _length(vector: Array) -> Any:
-    return sqrt(np.asarray([vector.dot(vector) + MIN_SQUARE]))[0]
+    return _root(vector.dot(vector) + MIN_SQUARE)
 
 
 def _clamped(x: Any, limit: Any) -> Any:

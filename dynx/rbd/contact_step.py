@@ -24,10 +24,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from dynx.model.geometry import Shape, Sphere
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.rbd.block_sweeps import (
     Block,
@@ -42,6 +43,7 @@ from dynx.rbd.block_sweeps import (
     impulse_velocities,
 )
 from dynx.rbd.constraints import NEGLIGIBLE, displacement_velocity, opening_velocity
+from dynx.rbd.contact_geometry import plane_point_count, plane_points
 from dynx.rbd.crba import mass_matrix
 from dynx.rbd.displacement import floating_displacement, floating_end_velocity
 from dynx.rbd.eliminated_rows import (
@@ -71,6 +73,48 @@ Repeat = Callable[[Callable[[Numbers], Numbers], Numbers, int], Numbers]
 of steps, to the last state. It ends where ``goes_on`` (1,) of the state is 0."""
 
 
+Axes = tuple[tuple[float, float, float], ...]
+
+LEVEL: Axes = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+"""Axes of level ground."""
+
+
+class FramedShape(NamedTuple):
+    """A shape of a robot that may touch the ground."""
+
+    frame: int
+    """Number of a frame of the mechanism."""
+    shape: Shape
+    R: Floats
+    """Orientation (3, 3) and place (3,) of the shape in the frame."""
+    p: Floats
+    friction: Any
+    """Coefficient of friction with the ground."""
+    deepest: bool = False
+    """True if only the deepest point of the shape counts."""
+
+
+@dataclass(frozen=True)
+class ShapesOnPlane:
+    """Shapes of a robot that may touch a plane of the world, the points x with normal . x = offset."""
+
+    shapes: tuple[FramedShape, ...]
+    axes: Axes = LEVEL
+    """Normal of the plane, outwards, and two tangents: orthogonal unit vectors."""
+    offset: Any = 0.0
+
+    @property
+    def counts(self) -> list[int]:
+        """Number of contact points of each shape."""
+        return [plane_point_count(each.shape, deepest=each.deepest) for each in self.shapes]
+
+    @property
+    def friction(self) -> list[Any]:
+        """Coefficient of friction of each contact point."""
+        pairs = zip(self.counts, self.shapes, strict=True)
+        return [each.friction for count, each in pairs for _ in range(count)]
+
+
 @dataclass(frozen=True)
 class SpheresOnPlane:
     """Spheres of a robot that may touch a plane of the world, the points x with normal . x = offset."""
@@ -79,9 +123,21 @@ class SpheresOnPlane:
     """Numbers of the frames of the mechanism at whose origins the spheres are."""
     radii: tuple[float, ...]
     """Radii [m]."""
-    axes: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    friction: Any
+    """Coefficient of friction."""
+    axes: Axes = LEVEL
     """Normal of the plane, outwards, and two tangents: orthogonal unit vectors."""
-    offset: float = 0.0
+    offset: Any = 0.0
+
+    @property
+    def as_shapes(self) -> ShapesOnPlane:
+        """The spheres as shapes."""
+        pairs = zip(self.frames, self.radii, strict=True)
+        shapes = [
+            FramedShape(frame, Sphere(radius), np.eye(3), np.zeros(3), self.friction)
+            for frame, radius in pairs
+        ]
+        return ShapesOnPlane(tuple(shapes), self.axes, self.offset)
 
 
 @dataclass(frozen=True)
@@ -92,39 +148,24 @@ class ServoJoints:
     kd: Array
     damping: Array
     armature: Array
-    friction: Array
-    """Torque of dry friction [N m or N]."""
-    stiffness: Array
-    """Stiffness of springs [N m/rad or N/m]."""
-    reference: Array
-    """Positions at which the springs do not pull [rad or m]."""
-    lower: Floats
-    """Lowest positions [rad or m]; minus infinity without a stop."""
-    upper: Floats
-    """Highest positions [rad or m]; infinity without a stop."""
     max_torque: Array | None = None
     """Largest torque of each motor [N m or N]; None without a limit."""
-
-    @classmethod
-    def of(cls, kp: Array, kd: Array, **others: Array | None) -> ServoJoints:
-        """Return motors with gains (n joints,), and zero or no stop for what `others` do not have."""
-        n = len(kp)
-        given: dict[str, Any] = {
-            name: np.zeros(n) for name in ("damping", "armature", "friction", "stiffness", "reference")
-        }
-        given |= {"lower": np.full(n, -np.inf), "upper": np.full(n, np.inf)}
-        return cls(kp, kd, **{**given, **others})
+    friction: Array | None = None
+    """Torque of dry friction [N m or N]; None without."""
+    springs: tuple[Array, Array] | None = None
+    """Stiffnesses of springs [N m/rad or N/m], and the positions at which they do not pull [rad or m]."""
+    stops: tuple[Floats, Floats] | None = None
+    """Lowest and highest positions [rad or m], infinite without a stop."""
 
     @property
     def limited(self) -> list[int]:
         """Numbers of the joints with dry friction or stops, which have a row of impulses each."""
-        return [
-            k
-            for k, (friction, low, high) in enumerate(zip(self.friction, self.lower, self.upper, strict=True))
-            if not (isinstance(friction, float | int) and friction == 0.0)
-            or np.isfinite(low)
-            or np.isfinite(high)
-        ]
+        found = set[int]()
+        if self.friction is not None:
+            found |= {k for k, each in enumerate(self.friction) if not _is_zero(each)}
+        if self.stops is not None:
+            found |= {k for stops in self.stops for k in np.flatnonzero(np.isfinite(stops)).tolist()}
+        return sorted(found)
 
 
 @dataclass(frozen=True)
@@ -149,14 +190,13 @@ def repeat_numbers(step: Callable[[Numbers], Numbers], state: Numbers, most: int
 def contact_step(
     mechanism: Mechanism,
     joints: ServoJoints,
-    spheres: SpheresOnPlane,
+    touching: ShapesOnPlane | SpheresOnPlane,
     sweeps: Sweeps,
     h: float,
     q: Array,
     v: Array,
     target: Array,
     impulses: Array,
-    friction: Sequence[Any] | Array,
     repeat: Repeat = repeat_numbers,
     *,
     regrouped: Mechanism | None = None,
@@ -165,20 +205,23 @@ def contact_step(
     step.
 
     The length of the step is `h` [s]. `target` (n joints,) are positions; `impulses` are those of the step
-    before: normal and tangents of each contact, then those of the joints with dry friction or stops.
-    `friction` has a coefficient for each contact. `regrouped` is the mechanism with base parameters
-    (`dynx.rbd.base_parameters`), which take fewer operations for the bias torque. The residual is the largest
-    violation of the laws of contact.
+    before: normal and tangents of each contact point, then those of the joints with dry friction or stops.
+    `regrouped` is the mechanism with base parameters (`dynx.rbd.base_parameters`), which take fewer
+    operations for the bias torque. The residual is the largest violation of the laws of contact.
     """
+    if isinstance(touching, SpheresOnPlane):
+        touching = touching.as_shapes
     base, last = mechanism.nv - len(mechanism.bodies), mechanism.nv - 1
     M = mass_matrix(mechanism, q)
     bias = bias_torque(mechanism if regrouped is None else regrouped, q, v)
     positions, rates = q[len(q) - len(mechanism.bodies) :], v[base:]
-    rows, gaps = contact_rows(mechanism, spheres, q)
+    rows, gaps = contact_rows(mechanism, touching, q)
     motors, stiffness = motor_law(joints, h, positions, rates, target)
     others, added = -bias, joints.armature + h * joints.damping
-    springs = joints.stiffness * (joints.reference - positions)
-    others[base:] = others[base:] - joints.damping * rates + springs
+    others[base:] = others[base:] - joints.damping * rates
+    if joints.springs is not None:
+        stiffnesses, places = joints.springs
+        others[base:] = others[base:] + stiffnesses * (places - positions)
 
     def factors(stiffness: Array) -> tuple[list[dict[int, Array]], list[Array]]:
         diagonal = np.concatenate([np.zeros(base), added + stiffness])
@@ -212,7 +255,7 @@ def contact_step(
         c[3 * k] = c[3 * k] + each
     blocks = blocks_of(eliminated, contacts, len(limited))
     bounds = [_bounds(joints, k, positions[k], h) for k in limited]
-    solved, w = _solved_impulses(blocks, sweeps, c, list(friction), bounds, impulses, repeat)
+    solved, w = _solved_impulses(blocks, sweeps, c, touching.friction, bounds, impulses, repeat)
     for k, each in enumerate(opening):
         w[k] = w[k] - each
     extra = _displacement(blocks, sweeps, L, eliminated, gaps, bounds, w, h, repeat)
@@ -222,14 +265,14 @@ def contact_step(
         q, v = floating_displacement(q, end + extra, end, h, mechanism.root_center)
     else:
         q, v = q + h * (end + extra), end
-    first = len(q) - len(positions)
-    q = as_objects(list(q))
-    for k in limited:
+    if joints.stops is not None:
         # Rounding and the tolerance of the sweeps shall not carry a joint beyond a stop.
-        if np.isfinite(joints.lower[k]):
-            q[first + k] = maximum(q[first + k], minimum(joints.lower[k], positions[k]))
-        if np.isfinite(joints.upper[k]):
-            q[first + k] = minimum(q[first + k], maximum(joints.upper[k], positions[k]))
+        first, q = len(q) - len(positions), as_objects(list(q))
+        for k, (low, high) in enumerate(zip(*joints.stops, strict=True)):
+            if np.isfinite(low):
+                q[first + k] = maximum(q[first + k], minimum(low, positions[k]))
+            if np.isfinite(high):
+                q[first + k] = minimum(q[first + k], maximum(high, positions[k]))
     return {"q": q, "v": v, "impulses": solved["impulses"], "residual": solved["residual"]}
 
 
@@ -255,32 +298,40 @@ def _limited(limit: Array, motors: Array, stiffness: Array, a: Array) -> tuple[A
 def _bounds(joints: ServoJoints, k: int, position: Any, h: float) -> JointBounds:
     """Return the law of joint k in a step; one that is beyond a stop may not move further."""
     low, high = -np.inf, np.inf
-    if np.isfinite(joints.lower[k]):
-        low = -opening_velocity(position - joints.lower[k], h)
-    if np.isfinite(joints.upper[k]):
-        high = opening_velocity(joints.upper[k] - position, h)
-    return JointBounds(h * joints.friction[k], low, high)
+    if joints.stops is not None:
+        lowest, highest = (stops[k] for stops in joints.stops)
+        if np.isfinite(lowest):
+            low = -opening_velocity(position - lowest, h)
+        if np.isfinite(highest):
+            high = opening_velocity(highest - position, h)
+    return JointBounds(0.0 if joints.friction is None else h * joints.friction[k], low, high)
+
+
+def _is_zero(x: Any) -> bool:
+    return isinstance(x, float | int) and x == 0.0
 
 
 def contact_rows(
-    mechanism: Mechanism, spheres: SpheresOnPlane, q: Array
+    mechanism: Mechanism, touching: ShapesOnPlane, q: Array
 ) -> tuple[list[SparseRow], list[Array]]:
-    """Return the rows (normal, two tangents) of the lowest point of each sphere, and the gaps [m].
+    """Return the rows (normal, two tangents) of each contact point, and the gaps [m].
 
     Entries are in the order of elimination, those of a floating base for velocities in its axes.
     """
     bodies, last = mechanism.bodies, mechanism.nv - 1
     base = mechanism.nv - len(bodies)
     angles = q[len(q) - len(bodies) :]
-    axes: Array = np.array(spheres.axes)
-    height: Any = -spheres.offset
+    axes: Array = np.array(touching.axes)
+    # The plane in the axes of the root.
+    offset: Any = touching.offset
     if mechanism.floating:
-        height = axes[0].dot(q[:3]) - spheres.offset
+        offset = offset - axes[0].dot(q[:3])
         axes = axes @ rotation_from_quat(q[3:7])
+    frames = [mechanism.frames[each.frame] for each in touching.shapes]
     # Poses of the bodies, and directions, in the axes of the root.
     R: dict[int, Array] = {ROOT: np.eye(3, dtype=int)}
     p: dict[int, Array] = {ROOT: np.zeros(3, dtype=int)}
-    moving = {k for frame in spheres.frames for k in ancestry(mechanism, mechanism.frames[frame].body)}
+    moving = {k for frame in frames for k in ancestry(mechanism, frame.body)}
     for k, body in enumerate(bodies):
         if k in moving:
             placement = Placement.of(body, angles[k])
@@ -288,24 +339,24 @@ def contact_rows(
             p[k] = p[body.parent] + rotate(R[body.parent], placement.p)
     rows: list[SparseRow] = []
     gaps: list[Array] = []
-    for number, radius in zip(spheres.frames, spheres.radii, strict=True):
-        frame = mechanism.frames[number]
-        center = p[frame.body] + rotate(R[frame.body], frame.p)
-        gap = height + axes[0].dot(center) - radius
-        gaps.append(gap)
-        # The impulses act in the middle between the surfaces.
-        point = center - (radius + 0.5 * gap) * axes[0]
-        columns = {}
-        for k in ancestry(mechanism, frame.body):
-            axis = rotate(R[k], bodies[k].axis)
-            columns[base + k] = cross(axis, point - p[k]) if bodies[k].revolute else axis
-        for direction in axes:
-            row: SparseRow = {last - k: column.dot(direction) for k, column in columns.items()}
-            if mechanism.floating:
-                moment = cross(point, direction)
-                row.update({last - k: direction[k] for k in range(3)})
-                row.update({last - 3 - k: moment[k] for k in range(3)})
-            rows.append(row)
+    for each, frame in zip(touching.shapes, frames, strict=True):
+        center = p[frame.body] + rotate(R[frame.body], frame.p + frame.R @ each.p)
+        turned = R[frame.body] @ (frame.R @ each.R)
+        for gap, point in plane_points(each.shape, turned, center, axes, offset, deepest=each.deepest):
+            gaps.append(gap)
+            # The impulses act in the middle between the surfaces.
+            point = point - (0.5 * gap) * axes[0]
+            columns = {}
+            for k in ancestry(mechanism, frame.body):
+                axis = rotate(R[k], bodies[k].axis)
+                columns[base + k] = cross(axis, point - p[k]) if bodies[k].revolute else axis
+            for direction in axes:
+                row: SparseRow = {last - k: column.dot(direction) for k, column in columns.items()}
+                if mechanism.floating:
+                    moment = cross(point, direction)
+                    row.update({last - k: direction[k] for k in range(3)})
+                    row.update({last - 3 - k: moment[k] for k in range(3)})
+                rows.append(row)
     return rows, gaps
 
 

@@ -116,12 +116,13 @@ def test_floats_and_fifty_digits_agree_with_the_kernel() -> None:
     on_floats = text.function(**dict(zip(names, (each[0] for each in given), strict=True)))
     for mine, wanted in zip(found, on_floats.values(), strict=True):
         np.testing.assert_allclose(mine[0], np.asarray(wanted, dtype=float), rtol=0.0, atol=1e-9)
-    touching = SpheresOnPlane(tuple(map(model.frame_index, FEET)), (RADIUS,) * 4)
-    joints = ServoJoints.of(np.full(12, KP), np.full(12, KD))
+    touching = SpheresOnPlane(tuple(map(model.frame_index, FEET)), (RADIUS,) * 4, FRICTION)
+    zero = np.zeros(12)
+    joints = ServoJoints(np.full(12, KP), np.full(12, KD), zero, zero)
     with fifty_digits():
         q, v, target, impulses = (exactly(each[0]) for each in given)
         found_exactly = contact_step(
-            exact_mechanism(model), joints, touching, TIGHT, H, q, v, target, impulses, [FRICTION] * 4
+            exact_mechanism(model), joints, touching, TIGHT, H, q, v, target, impulses
         )
         for mine, wanted in zip(found, found_exactly.values(), strict=True):
             np.testing.assert_allclose(mine[0], np.asarray(wanted, dtype=float), rtol=0.0, atol=1e-9)
