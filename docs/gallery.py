@@ -176,7 +176,8 @@ def two_engines(path: str) -> None:
 
 @picture(
     "Gravity torques",
-    "The numbers are the torques against gravity. The length of each arrow is the torque divided by its limit.",
+    "The numbers are the torques against gravity. The length of each arrow is the torque divided by its "
+    "limit.",
 )
 def gravity_torques(path: str) -> None:
     with dynx.load("panda").view(q=[0, 0.5, 0, -1.6, 0, 2.1, 0.8, 0.02], whole_meshes=True) as viewer:
