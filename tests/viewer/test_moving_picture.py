@@ -6,7 +6,6 @@ import io
 import math
 import threading
 import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -160,30 +159,33 @@ def test_a_page_draws_fewer_triangles_while_a_part_moves(
         assert not page.errors
 
 
-def _between(count: Callable[[], int], low: float, high: float) -> bool:
-    return low < count() < high
-
-
 def test_cells_grow_where_many_triangles_move(
     open_page: OpenPage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     few = COARSE_WHILE_MOVING.replace(f"const TRIANGLES = {COARSE}", "const TRIANGLES = 500")
     assert few != COARSE_WHILE_MOVING
-    drawn = []
+    drawn: list[int] = []
     for script in (COARSE_WHILE_MOVING, few):
         monkeypatch.setattr("dynx.viewer.browser.COARSE_WHILE_MOVING", script)
         with dynx.load(ball(tmp_path, smooth=True)).view(whole_meshes=False) as viewer:
             page = open_page(viewer.url)
             connected(viewer)
             viewer.look_from(Camera.look_at((1.5, -1.5, 0.6), (0.0, 0.0, 0.0)))
-            count = partial(page.page.evaluate, TRIANGLES)
-            until(partial(_between, count, 10_000, math.inf), "the whole ball at rest")
+            counts: list[int] = []
+
+            def between(low: float, high: float, counts: list[int] = counts, page: Opened = page) -> bool:
+                counts.append(int(page.page.evaluate(TRIANGLES)))
+                return low < counts[-1] < high
+
+            until(partial(between, 10_000, math.inf), "the whole ball at rest")
             page.page.wait_for_timeout(PICTURE)
             still = area_and_colour(page)
             with Moving(viewer):
-                until(partial(_between, count, 100, 10_000), "a coarse ball")
+                until(partial(between, 100, 10_000), "a coarse ball")
                 page.page.wait_for_timeout(PICTURE)
-                drawn.append(count())
+                # A busy machine may hold up the motion, and the page then draws the whole ball between.
+                fewest = 0.6 * drawn[0] if drawn else 10_000
+                until(partial(between, 100, fewest), "a ball as coarse as its cells are large")
+                drawn.append(counts[-1])
                 assert area_and_colour(page) == pytest.approx(still, rel=0.2)
             assert not page.errors
-    assert drawn[1] < 0.6 * drawn[0]
