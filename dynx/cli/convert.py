@@ -97,8 +97,7 @@ _KEPT = "a file that is read"
 
 def _certified(model: Model, found: Conversion) -> Conversion:
     """Return a conversion with what differs in some state as differences, if no part differs by itself."""
-    if found.robot is None or found.differences or model.ball_joints:
-        # Robots with ball joints are compared part by part alone.
+    if found.robot is None or found.differences:
         return found
     report = same_robot(without_shapes(model), found.robot)
     missing = [each.message for each in report.unmatched]

@@ -1,4 +1,5 @@
-"""Rigid transforms that may map a whole floating robot at its zero positions onto another one.
+"""Rigid transforms that may map a whole floating robot at its zero positions onto another one, or what is
+below a ball joint.
 
 Where no body determines its frame alone, as in a robot of slides and links without mass, the joint axes and
 the centres of mass of all bodies together do. Directions of axes have no sign, slides no place.
@@ -32,9 +33,9 @@ ISOLATED = 1e-4
 
 @dataclass
 class _Features:
-    """Axes and places of a robot at its zero positions, in the frame of its root, with the same keys in both
-    robots: joint axes and principal axes, which have no sign; directions with a sign; and places, each with
-    the projection (3, 3) onto the shifts that it determines."""
+    """Axes and places of a robot at its zero positions, in the frame of its first body, with the same keys in
+    both robots: joint axes and principal axes, which have no sign; directions with a sign; and places, each
+    with the projection (3, 3) onto the shifts that it determines."""
 
     axes: dict[object, Floats] = field(default_factory=dict)
     principal: dict[object, Floats] = field(default_factory=dict)
@@ -43,10 +44,12 @@ class _Features:
 
 
 def arrangements(ours: Skeleton, theirs: Skeleton, pairs: list[tuple[int, int]]) -> Iterator[Floats]:
-    """Yield poses (4, 4) of the root frame of `theirs` in that of `ours` from all bodies together.
+    """Yield poses (4, 4) of the frame of the first body of `theirs` in that of `ours` from all bodies.
 
-    `pairs` are the bodies that may be counterparts, parents first. Inertia that may belong to the parent of
-    a joint may be split otherwise in `theirs`; the bodies' own inertias are tried second.
+    `pairs` are the bodies that may be counterparts, parents first: the roots and others, or the bodies of two
+    ball joints and others below them. Of ball joints among the others only the centre counts. Inertia that
+    may belong to the parent of a joint may be split otherwise in `theirs`; the bodies' own inertias are
+    tried second.
     """
     for grouped in (True, False):
         first = _features(ours, [a for a, _ in pairs], grouped)
@@ -57,23 +60,32 @@ def arrangements(ours: Skeleton, theirs: Skeleton, pairs: list[tuple[int, int]])
 
 
 def _features(skeleton: Skeleton, order: list[int], grouped: bool) -> _Features:
-    found, poses = _Features(), _zero_poses(skeleton)
+    found, poses = _Features(), _zero_poses(skeleton, order)
     inertias: Mapping[int, RigidInertia] = skeleton.grouped if grouped else skeleton.inertias
     for key, body in enumerate(order):
         T, inertia = poses[body], inertias[body]
-        turns = body != ROOT and skeleton.bodies[body].revolute
-        if body != ROOT:
+        kind = None if body == ROOT else skeleton.kinds[body]
+        if kind == "ball":
+            found.places[key, "centre"] = T[:3, 3], np.eye(3)
+            if key == 0:
+                _add_way(found, key, inertia.first_moment, skeleton.whole.mass * skeleton.reach)
+                for number, axis in _principal_axes(
+                    RigidInertia(np.ones(()), np.zeros(3), inertia.rotational_inertia)
+                ):
+                    found.principal[key, number] = axis
+            continue
+        if kind is not None and key > 0:
             axis = found.axes[key] = T[:3, :3] @ skeleton.axes[body]
-            if turns:
+            if kind == "revolute":
                 found.places[key, "line"] = T[:3, 3], np.eye(3) - np.outer(axis, axis)
         mass = float(inertia.mass)
-        if grouped and turns:
+        if grouped and kind == "revolute":
             # The parent may have the mass, and what of the first moment is along the axis.
             off = T[:3, :3] @ inertia.first_moment
             _add_way(found, key, off - axis * (axis @ off), skeleton.whole.mass * skeleton.reach)
         elif mass > 0.0:
             found.places[key, "centre"] = T[:3, :3] @ (inertia.first_moment / mass) + T[:3, 3], np.eye(3)
-        if body == ROOT or not grouped:
+        if kind is None or not grouped:
             for number, axis in _principal_axes(inertia):
                 found.principal[key, number] = T[:3, :3] @ axis
     _add_offsets(found, skeleton.reach)
@@ -91,10 +103,11 @@ def _principal_axes(inertia: RigidInertia) -> Iterator[tuple[int, Floats]]:
             yield number, axes[:, number]
 
 
-def _zero_poses(skeleton: Skeleton) -> dict[int, Floats]:
-    poses = {ROOT: np.eye(4)}
-    for number, body in enumerate(skeleton.bodies):
-        poses[number] = poses[body.parent] @ skeleton.placements[number]
+def _zero_poses(skeleton: Skeleton, order: list[int]) -> dict[int, Floats]:
+    """Return the poses (4, 4) of bodies, parents first, in the frame of the first one."""
+    poses = {order[0]: np.eye(4)}
+    for number in order[1:]:
+        poses[number] = poses[skeleton.bodies[number].parent] @ skeleton.placements[number]
     return poses
 
 

@@ -17,7 +17,7 @@ from dynx.model.mechanism import ROOT
 from dynx.model.xml.several_files import file_of_line
 from dynx.same.decimals import rounded
 from dynx.same.fit import BodyFit, Fit, angle_of
-from dynx.same.limits import differs, limit_differences
+from dynx.same.limits import differs, limit_pairs
 from dynx.same.scales import inertia_ratio
 from dynx.same.shapes import NEGLIGIBLE, SHAPE_KINDS, MatchedShapes, ShapeKind, ShapeOfBody, matched_shapes
 from dynx.same.skeleton import float_inertia, subtract, transformed
@@ -86,7 +86,7 @@ def name_files_of_lines(difference: object) -> None:
 class DescriptionFreedom:
     """A difference of two descriptions that is none of the robots, in words."""
 
-    kind: Literal["frame", "axis", "order", "links", "inertia", "contacts", "constraint"]
+    kind: Literal["frame", "axis", "zero pose", "order", "links", "inertia", "contacts", "constraint"]
     ours: str | None
     theirs: str | None
     message: str
@@ -114,7 +114,7 @@ def _of_joint(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> Ite
     if mine.name != joint.name:
         yield Attribute("name", "joint", mine.name, joint.name, mine.name, joint.name, mine.line, joint.line)
     rows: list[tuple[Kind, float, float]] = [
-        *limit_differences(mine.limits, joint.limits, each.sign, tolerance),
+        *limit_pairs(mine.limits, joint.limits, each.sign),
         ("damping", mine.dynamics.damping, joint.dynamics.damping),
         ("friction", mine.dynamics.friction, joint.dynamics.friction),
         ("armature", mine.dynamics.armature, joint.dynamics.armature),
@@ -123,18 +123,37 @@ def _of_joint(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> Ite
     references = [dynamics.spring_reference for dynamics in (mine.dynamics, joint.dynamics)]
     if mine.dynamics.stiffness and joint.dynamics.stiffness:
         rows.append(("spring reference", references[0], each.sign * references[1]))
+    turns = _turns_of_ball(mine, joint, each, tolerance) if each.before is not None else {}
     for kind, first, second in rows:
-        if differs(first, second, tolerance):
+        if differs(first, second, tolerance) or kind in turns:
             yield Attribute(
                 kind,
                 "joint",
                 mine.name,
                 joint.name,
                 number_text(first),
-                number_text(second),
+                number_text(second) + turns.get(kind, ""),
                 mine.line,
                 joint.line,
             )
+
+
+def _turns_of_ball(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> dict[Kind, str]:
+    """Return how numbers of a ball joint differ that count from its zero pose, or about the axes of its
+    child, and are equal."""
+    found: dict[Kind, str] = {}
+    if each.zero_turn > tolerance and joint.limits.upper < np.pi and mine.limits.upper < np.pi:
+        found["upper limit"] = f" from a zero pose turned by {each.zero_turn:.6g} rad"
+    entries = np.abs(rounded(each.D[:3, :3]))
+    if float(np.max(np.minimum(entries, np.abs(1.0 - entries)))) > tolerance:
+        words = f" about axes turned by {angle_of(each.D):.6g} rad"
+        if mine.dynamics.friction and joint.dynamics.friction:
+            found["friction"] = words
+        if np.isfinite(mine.limits.velocity) and np.isfinite(joint.limits.velocity):
+            found["velocity limit"] = words
+        if np.isfinite(mine.limits.effort) and np.isfinite(joint.limits.effort):
+            found["effort limit"] = words
+    return found
 
 
 def number_text(value: float) -> str:
@@ -246,8 +265,8 @@ def frame_differences(
     link, or of a link with mass or shapes, which are where they were; a difference where it only names a
     place."""
     fits = {each.theirs: each for each in found.bodies}
-    mine = {frame.name: frame for frame in found.ours.mechanism.frames}
-    for frame in found.theirs.mechanism.frames:
+    mine = {frame.name: frame for frame in found.ours.frames}
+    for frame in found.theirs.frames:
         other, each = mine.get(frame.name), fits.get(frame.body)
         if other is None or each is None or other.body != each.ours:
             continue
@@ -295,8 +314,12 @@ def line_of_link(model: Model, name: str) -> int | None:
 
 
 def freedoms(found: Fit, tolerance: float) -> Iterator[DescriptionFreedom]:
-    """Yield opposite axes, other orders of joints and links split otherwise."""
+    """Yield opposite axes, zero poses of ball joints, orders of joints and links that are split otherwise."""
     for each in found.bodies:
+        if each.zero_turn > max(tolerance, NEGLIGIBLE):
+            mine, other = found.ours.joints[each.ours].name, found.theirs.joints[each.theirs].name
+            message = f"zero pose of ball joint {other} turned by {each.zero_turn:.6g} rad"
+            yield DescriptionFreedom("zero pose", mine, other, message)
         if each.sign < 0:
             mine, other = found.ours.joints[each.ours].name, found.theirs.joints[each.theirs].name
             yield DescriptionFreedom(

@@ -44,10 +44,12 @@ def bounds(found: Fit, unseen: frozenset[int]) -> Bounds:
     for each in found.bodies:
         if each.ours == ROOT:
             continue
-        revolute = ours.bodies[each.ours].revolute
+        kind = ours.kinds[each.ours]
         off, travel = 2.0 * each.axis, _travel(ours.joints[each.ours].limits)
         coupled = _product(each.scale, travel) + each.offset
-        if revolute:
+        if kind == "ball":
+            shift += each.line
+        elif kind == "revolute":
             angle += off + coupled
             shift += 2.0 * each.line + off * reach
         else:

@@ -11,7 +11,6 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.reading import printable
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.loading import load, read_description, read_model
 from dynx.model.mechanism import ROOT
 from dynx.model.numbers import is_real
@@ -45,6 +44,8 @@ from dynx.same.report import Coordinate, ElementDifference, SameReport, Unmatche
 from dynx.same.sensors import sensor_differences
 from dynx.same.skeleton import Skeleton, exact_skeleton, without_standing_mimics
 from dynx.same.text import inertial_text, pose_text, vector_text
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_from_rotation
 
 Robot = StrPath | bytes | bytearray | Model
 
@@ -184,11 +185,9 @@ def same_robot(
 def _read(x: Robot, base: Base | None, folders: list[StrPath]) -> _Loaded:
     if isinstance(x, Model):
         model = load(x, base=base)
-        refuse_ball_joints(model, "same_robot")
         return _Loaded(model, model.name)
     data, source, name = read_description(x, folders)
     model = read_model(data, source, name, base=base, package_dirs=folders)
-    refuse_ball_joints(model, "same_robot")
     if name is None:
         return _Loaded(model, model.name, data)
     return _Loaded(model, printable(x if isinstance(x, str) else source), data)
@@ -358,17 +357,33 @@ def _unseen_bodies(analysis: Analysis) -> frozenset[int]:
 
 def _coordinates(found: Fit) -> tuple[Coordinate, ...]:
     ours, theirs = found.ours.model, found.theirs.model
-    base = 7 if ours.floating else 0
-    mine = {name: base + k for k, name in enumerate(ours.joint_names)}
-    other = {name: base + k for k, name in enumerate(theirs.joint_names)}
+    mine, other = set(ours.joint_names), set(theirs.joint_names)
     rows = []
     for each in found.bodies:
         if each.ours == ROOT:
             continue
         a, b = found.ours.joints[each.ours].name, found.theirs.joints[each.theirs].name
         if a in mine and b in other:
-            rows.append(Coordinate(a, b, mine[a], other[b], each.sign))
+            before, after = (None, None) if each.before is None else map(_quaternion, each.turns)
+            rows.append(
+                Coordinate(
+                    a,
+                    b,
+                    ours.position_index(a),
+                    theirs.position_index(b),
+                    each.sign,
+                    ours.coordinate_index(a),
+                    theirs.coordinate_index(b),
+                    before,
+                    after,
+                )
+            )
     return tuple(sorted(rows, key=lambda row: row.first_index))
+
+
+def _quaternion(R: Floats) -> tuple[float, float, float, float]:
+    x, y, z, w = (quat_from_rotation(R) + 0.0).tolist()
+    return x, y, z, w
 
 
 # -- the mended description -------------------------------------------------------------------------
@@ -392,7 +407,9 @@ def _mended(
     if not are_equal(ours, without_standing_mimics(mended), analysis.fit, tolerance):
         return None, None, "the replaced elements do not make the robots the same"
     if second.data is None:
-        return mended, mended.to_urdf().encode(), None
+        # URDF has no ball joints.
+        text = mended.to_mjcf() if mended.ball_joints else mended.to_urdf()
+        return mended, text.encode(), None
     try:
         source = mended_text(second.source, second.model, mended)
         again = read_model(source.to_bytes(), second.model.source, None, base=None)

@@ -13,17 +13,22 @@ from dynx.same.attributes import Attribute, Kind, listed, number_text
 from dynx.same.decimals import rounded
 from dynx.same.fit import Fit
 from dynx.same.stated import counterparts
-from dynx.same.text import pose_text
+from dynx.same.text import pose_text, vector_text
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
-from dynx.spatial.so3 import rotation_from_quat
+from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
+
+ROTATION_ENTRIES = 4.0
+"""Difference of an entry of a rotation that counts, relative to the tolerance of an angle [rad]."""
 
 
 class _Configuration(NamedTuple):
-    """A configuration: positions of our joints, and the pose (4, 4) of our base if it floats."""
+    """A configuration: positions of our joints, rotations (3, 3) of ball joints, and the pose (4, 4) of our
+    base if it floats."""
 
     name: str
     positions: dict[str, float]
+    rotations: dict[str, Floats]
     T_world_base: Floats | None
     line: int | None
 
@@ -40,11 +45,14 @@ def configuration_differences(
         for each in found.bodies[1:]
     ]
     joints = [row for row in joints if row[1] in ours.joint_names and row[2] in theirs.joint_names]
+    balls = [row for row in joints if row[0].before is not None]
+    joints = [row for row in joints if row[0].before is None]
     D = rounded(found.bodies[0].D)
     mine = [
         _Configuration(
             each.name,
             {one: float(q[ours.position_index(one)]) for _, one, _ in joints},
+            {one: _rotation(ours, q, one) for _, one, _ in balls},
             _base(q) if ours.floating else None,
             each.line,
         )
@@ -55,6 +63,7 @@ def configuration_differences(
         _Configuration(
             each.name,
             {one: fit.sign * float(q[theirs.position_index(two)]) for fit, one, two in joints},
+            {one: fit.turns[0] @ _rotation(theirs, q, two) @ fit.turns[1] for fit, one, two in balls},
             _base(q) @ inverse(D) if theirs.floating else None,
             each.line,
         )
@@ -69,6 +78,10 @@ def configuration_differences(
             name
             for name, x in a.positions.items()
             if abs(x - b.positions[name]) > tolerance * (reach if ours.joint(name).unit == "m" else 1.0)
+        ] + [
+            name
+            for name, R in a.rotations.items()
+            if np.abs(R - b.rotations[name]).max() > ROTATION_ENTRIES * tolerance
         ]
 
     def base_differs(a: _Configuration, b: _Configuration) -> bool:
@@ -76,7 +89,7 @@ def configuration_differences(
             return False
         size = reach + float(np.abs(a.T_world_base[:3, 3]).max())
         off = np.abs(a.T_world_base - b.T_world_base)
-        return bool(off[:3, :3].max() > 4.0 * tolerance or off[:3, 3].max() > tolerance * size)
+        return bool(off[:3, :3].max() > ROTATION_ENTRIES * tolerance or off[:3, 3].max() > tolerance * size)
 
     def are_equal(a: _Configuration, b: _Configuration) -> bool:
         return not changed(a, b) and not base_differs(a, b)
@@ -97,13 +110,24 @@ def configuration_differences(
         yield Attribute(kind, "configuration", labels[0], labels[1], texts[0], texts[1], lines[0], lines[1])
 
 
+def _rotation(model: Model, q: Floats, ball: str) -> Floats:
+    first = model.position_index(ball)
+    return rotation_from_quat(q[first : first + 4])
+
+
 def _base(q: Floats) -> Floats:
     return homogeneous(rotation_from_quat(q[3:7]), q[:3])
 
 
 def _text(configuration: _Configuration, joints: list[str], base: bool) -> str:
     """Write the positions that differ, in the coordinates of our robot."""
-    words = [f"{name} {number_text(configuration.positions[name])}" for name in joints]
+    positions, rotations = configuration.positions, configuration.rotations
+    words = [
+        f"{name} {number_text(positions[name])}"
+        if name in positions
+        else f"{name} {vector_text(quat_from_rotation(rotations[name]), 9)}"
+        for name in joints
+    ]
     if base and configuration.T_world_base is not None:
         words.insert(0, f"base {pose_text(Pose.from_matrix(configuration.T_world_base))}")
     return listed(words) if words else "stated"

@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from dynx.model import Model
-from dynx.model.elements import Inertial, Joint, Link, Pose
+from dynx.model.elements import Inertial, Joint, Link, Pose, Vector
 from dynx.model.mechanism import ROOT, pose_arrays
 from dynx.model.topology import resolve_mimics
 from dynx.same.decimals import decimals, fifty_digits, rounded
@@ -333,6 +333,9 @@ def _other_types(ours: Model, theirs: Model) -> Iterator[DifferingElement]:
         if other.moves:
             fields = ["limits", "dynamics", "mimic"] if not joint.moves else []
             fields += [] if joint.moves else ["axis", "locked_at"]
+            if joint.moves and "ball" in (joint.type, other.type):
+                # The range of a ball joint is an angle about any axis.
+                fields += ["limits", "axis"]
             values = {name: getattr(other, name) for name in fields}
             if values.get("mimic") is not None and values["mimic"].joint not in drivers:
                 values["mimic"] = None
@@ -378,7 +381,7 @@ def _of_joints(found: Fit, tolerance: float) -> Iterator[DifferingElement]:
         if each.axis > tolerance:
             yield _axis(found, each)
         if each.scale > tolerance * _unit_scale(found, each) or each.offset > tolerance * (
-            1.0 if found.ours.bodies[each.ours].revolute else length
+            1.0 if found.ours.kinds[each.ours] == "revolute" else length
         ):
             yield _mimic(found, each)
 
@@ -396,11 +399,17 @@ def _origin(found: Fit, each: BodyFit, parent: BodyFit) -> DifferingElement:
     mine, joint = _joints(found, each)
     wanted = inverse(parent.D) @ found.ours.exact[each.ours] @ each.D
     place = inverse(found.theirs.parent_pose(each.theirs)) @ wanted
+    is_ball = found.ours.kinds[each.ours] == "ball"
+    if is_ball:
+        # Its centre alone has a place.
+        place = homogeneous(decimals_of_pose(joint.origin)[:3, :3], place[:3, 3])
     pose = nearest_pose(place, mine.origin)
+    if is_ball and pose is not mine.origin:
+        pose = replace(joint.origin, xyz=nearest_position(place, mine.origin))
     off = inverse(decimals(joint.origin.matrix)) @ place
     axis = np.array(joint.axis)
     message = _away("joint", each.shift, each.turn)
-    if each.shift <= 1e-12 * found.ours.reach and _about(off, axis):
+    if not is_ball and each.shift <= 1e-12 * found.ours.reach and _about(off, axis):
         message = f"position 0 of the joint is turned by {each.turn:.3g} rad about its axis"
     return DifferingElement(
         "origin",
@@ -426,7 +435,8 @@ def _moved_axis(found: Fit, each: BodyFit) -> DifferingElement:
     """Make the element of a joint whose axis is moved parallel, while its link is where it should be."""
     mine, joint = _joints(found, each)
     D, axis = rounded(each.D), found.ours.axes[each.ours]
-    foot = axis * float(axis @ D[:3, 3])
+    is_ball = found.ours.kinds[each.ours] == "ball"
+    foot = np.zeros(3) if is_ball else axis * float(axis @ D[:3, 3])
     shift = D[:3, :3].T @ (foot - D[:3, 3])
     there, back = homogeneous(np.eye(3), shift), homogeneous(np.eye(3), -shift)
     origin = nearest_pose(decimals(joint.origin.matrix @ there), mine.origin)
@@ -446,7 +456,8 @@ def _moved_axis(found: Fit, each: BodyFit) -> DifferingElement:
         mine.name,
         joint.name,
         each.line / found.ours.reach,
-        f"the axis is {each.line:.3g} m beside its place; its link is where it should be",
+        f"the {'centre' if is_ball else 'axis'} is {each.line:.3g} m beside its place; its link is where it "
+        "should be",
         pose_text(mine.origin),
         pose_text(joint.origin),
         tuple(changes),
@@ -802,6 +813,13 @@ def nearest_pose(T: Array, own: Pose) -> Pose:
     if float(np.max(np.abs(matrix - own.matrix))) < SNAP:
         return own
     return Pose.from_matrix(matrix)
+
+
+def nearest_position(T: Array, own: Pose) -> Vector:
+    """Return the position of `own` if it is that of the pose T (4, 4) to rounding, else that of T."""
+    x, y, z = rounded(T[:3, 3]).tolist()
+    near = all(abs(one - other) < SNAP for one, other in zip((x, y, z), own.xyz, strict=True))
+    return own.xyz if near else (x, y, z)
 
 
 def _names_text(names: list[str]) -> str:

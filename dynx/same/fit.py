@@ -12,7 +12,7 @@ from dynx.same.decimals import decimals, rounded
 from dynx.same.matching import BodyPair, MatchingPlan
 from dynx.same.skeleton import Skeleton, subtract, transformed
 from dynx.spatial.inertia import RigidInertia
-from dynx.spatial.scalar import Array
+from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import inverse
 from dynx.spatial.so3 import cross
 
@@ -25,6 +25,10 @@ class BodyFit:
     angle between the axes [rad], `line` the distance of the axes [m]. `turn` [rad] and `shift` [m] are those
     of the joint's place in the parent, `scale` and `offset` those of a mimic joint. `inertia` is the
     difference of the inertias, ours minus theirs, in the frame of our body.
+
+    Of a ball joint `line` is the distance of the centres. Its attitudes R(q) (3, 3) are those of its
+    counterpart, ``R(q_ours) = before R(q_theirs) D'`` with the rotation of D; `before` is None for other
+    joints.
     """
 
     ours: int
@@ -38,6 +42,21 @@ class BodyFit:
     scale: float = 0.0
     offset: float = 0.0
     inertia: RigidInertia | None = None
+    before: Array | None = None
+
+    @property
+    def turns(self) -> tuple[Floats, Floats]:
+        """Rotations (3, 3) before and after that of the counterpart of a ball joint."""
+        assert self.before is not None
+        return rounded(self.before), rounded(self.D[:3, :3]).T
+
+    @property
+    def zero_turn(self) -> float:
+        """Angle [rad] between the zero poses of two ball joints; 0 for other joints."""
+        if self.before is None:
+            return 0.0
+        before, after = self.turns
+        return angle_of(before @ after)
 
     @property
     def frame_turn(self) -> float:
@@ -101,10 +120,15 @@ def _joint_fit(ours: Skeleton, theirs: Skeleton, pair: BodyPair, frames: dict[in
         # What the place of the joint would have to be moved by, in the frame of the joint.
         off = inverse(followed) @ ours.exact[a] @ D
         turn, shift = angle_of(off), float(np.linalg.norm(rounded(off[:3, 3])))
+    if ours.kinds[a] == "ball":
+        # The zero pose of a ball joint may be any: only its centre has a place.
+        before = (inverse(ours.exact[a]) @ followed)[:3, :3]
+        line = float(np.linalg.norm(rounded(D[:3, 3])))
+        return BodyFit(a, b, D, line=line, shift=shift, before=before)
     axis, mine = D[:3, :3] @ theirs.bodies[b].axis, ours.bodies[a].axis
     sign = 1 if float(np.sum(axis * mine)) >= 0.0 else -1
     line = 0.0
-    if ours.bodies[a].revolute:
+    if ours.kinds[a] == "revolute":
         line = float(np.linalg.norm(rounded(cross(D[:3, 3], mine))))
     sine = float(np.linalg.norm(rounded(cross(axis, mine))))
     if float(np.sum(axis * mine)) * sign < 0.5:

@@ -21,16 +21,20 @@ def differs(first: float, second: float, tolerance: float) -> bool:
     return first != second and (math.isinf(size) or abs(first - second) > tolerance * size)
 
 
-def limit_differences(
-    first: Limits, second: Limits, sign: int, tolerance: float
-) -> Iterator[tuple[LimitKind, float, float]]:
-    """Yield the limits that differ; positions of the second joint are those of the first times `sign`."""
+def limit_pairs(first: Limits, second: Limits, sign: int) -> tuple[tuple[LimitKind, float, float], ...]:
+    """Return each limit of two joints; positions of the second joint are those of the first times `sign`."""
     low, high = sorted((first.lower, first.upper))
     other_low, other_high = sorted((sign * second.lower, sign * second.upper))
-    rows: tuple[tuple[LimitKind, float, float], ...] = (
+    return (
         ("lower limit", low, other_low),
         ("upper limit", high, other_high),
         ("velocity limit", first.velocity, second.velocity),
         ("effort limit", first.effort, second.effort),
     )
-    yield from (row for row in rows if differs(row[1], row[2], tolerance))
+
+
+def limit_differences(
+    first: Limits, second: Limits, sign: int, tolerance: float
+) -> Iterator[tuple[LimitKind, float, float]]:
+    """Yield the limits that differ."""
+    yield from (row for row in limit_pairs(first, second, sign) if differs(row[1], row[2], tolerance))

@@ -17,13 +17,11 @@ from typing import Any
 import numpy as np
 
 from dynx.model.mechanism import ROOT
-from dynx.rbd.base_parameters import rotation_to_axis, split_inertia
 from dynx.same.limits import limit_differences
 from dynx.same.registration import candidates
 from dynx.same.scales import extent, inertia_ratio
 from dynx.same.shapes import SHAPE_KINDS, matched_shapes
 from dynx.same.skeleton import Skeleton, are_alike, subtract, transformed
-from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 from dynx.spatial.so3 import cross, rotation_about
@@ -37,7 +35,7 @@ NEARLY = 0.1
 FRAMES_PER_JOINT = 12
 """Number of calls inside one another, at most, for each joint between the root and a tip."""
 
-MAX_CANDIDATES = 100
+MAX_CANDIDATES = 300
 """Largest number of candidates for the frame of one body."""
 
 MAX_BASES = 3
@@ -113,6 +111,7 @@ class Matching:
     _named: dict[tuple[int, int], tuple[list[tuple[int, int]], list[int], list[int]]] = field(
         default_factory=dict
     )
+    _turned_counts: dict[tuple[int, int], float] = field(default_factory=dict)
     _own_costs: dict[Key, float] = field(default_factory=dict)
     _unmoved: dict[tuple[int, int], bool] = field(default_factory=dict)
     _exhausted: set[tuple[int, int]] = field(default_factory=set)
@@ -123,7 +122,6 @@ class Matching:
         self.length = max(self.ours.reach, self.theirs.reach)
         self._digits = KEY_DIGITS - int(np.floor(np.log10(self.tolerance)))
         self._per_length = np.array([[1.0, 1.0, 1.0, 1.0 / self.length]] * 3)
-        self._axis_frames = [rotation_to_axis(np.eye(3), axis) for axis in self.ours.axes]
 
     def find(self) -> MatchingPlan:
         """Return the best plan of the whole robots. The frame of a floating base may be anywhere in it."""
@@ -191,6 +189,8 @@ class Matching:
         cost = self._own_cost(a, b, D)
         for i in self.ours.children[a]:
             back = inverse(self.ours.placements[i]) @ D
+            if self.ours.kinds[i] == "ball":
+                continue
             cost += not any(
                 self._alike(i, j) and self._own_cost(i, j, back @ self.theirs.placements[j]) == 0.0
                 for j in self.theirs.children[b]
@@ -213,9 +213,76 @@ class Matching:
                 complete = False
                 break
             followed = inverse(self.ours.placements[i]) @ D @ self.theirs.placements[j]
-            cost += self._followed(i, j, followed, limit - cost)
+            cost += self._fewest(i, j, followed, limit - cost)
         self._counts[key] = cost, complete and cost < limit
         return cost
+
+    def _fewest(self, a: int, b: int, D: Floats, limit: float) -> float:
+        """Return the least of the numbers `_followed` of the frames that a body has where D follows from its
+        parent, or any number from `limit` on."""
+        count = self._followed(a, b, D, limit)
+        if count == 0.0 or self.ours.kinds[a] != "ball":
+            return count
+        # What is below a ball joint does not depend on what is above it, but for the centre.
+        off = float(np.linalg.norm(D[:3, 3])) > self.tolerance * self.length
+        turned = self._turned_counts.get((a, b))
+        if turned is None:
+            turned = np.inf
+            for R in self._turns_of(a, b):
+                turned = min(turned, self._followed(a, b, homogeneous(R, np.zeros(3)), turned))
+                if turned == 0.0:
+                    break
+            self._turned_counts[a, b] = turned
+        return min(count, off + turned)
+
+    def _free_frames(self, a: int, b: int, followed: Floats) -> Iterator[Floats]:
+        """Yield the frames that cost nothing where `followed` follows from the parent: a body on a ball joint
+        may be turned about the centre."""
+        yield followed
+        if a == ROOT or self.ours.kinds[a] != "ball":
+            return
+        for D in self._turns_of(a, b):
+            if float(np.max(np.abs(D - followed[:3, :3]))) > SAME_FRAME:
+                yield homogeneous(D, followed[:3, 3])
+
+    def _turns_of(self, a: int, b: int) -> Iterator[Floats]:
+        """Yield each rotation (3, 3) of the candidates once."""
+        found: list[Floats] = []
+        for D in self._candidates_of(a, b):
+            R = D[:3, :3]
+            if not any(float(np.max(np.abs(R - each))) < SAME_FRAME for each in found):
+                found.append(R)
+                yield R
+
+    def _turned(self, a: int, b: int, followed: Floats) -> MatchingPlan:
+        """Return the best plan of two bodies on ball joints: their frames may be turned about the centre, and
+        where the centre is elsewhere, the joint or what is attached to its link is moved."""
+        places = [(followed[:3, 3], 0.0)]
+        if float(np.linalg.norm(followed[:3, 3])) > self.tolerance * self.length:
+            places.append((np.zeros(3), _cost(self._has_equal_origins(a, b))))
+        best: MatchingPlan | None = None
+        for p, extra in places:
+            found: list[tuple[float, int, Floats]] = []
+            at = homogeneous(followed[:3, :3], p)
+            for number, D in enumerate(self._free_frames(a, b, at)):
+                limit = found[MAX_BASES - 1][0] if len(found) >= MAX_BASES else np.inf
+                found.append((self._followed(a, b, D, limit), number, D))
+                found = sorted(found, key=_first_two)[:MAX_BASES]
+                if found[0][0] == 0.0:
+                    break
+            for count, number, D in found:
+                if best is not None and len(self._plans) > MAX_PLANS:
+                    break
+                if number == 0 and extra == 0.0:
+                    plan = self._subtree(a, b, D)
+                else:
+                    plan = self._chosen(a, b, D, extra)
+                if best is None or plan.rank < best.rank:
+                    best = plan
+                if count == 0.0:
+                    break
+        assert best is not None
+        return best
 
     def _chosen(self, a: int, b: int, D: Floats, extra: float) -> MatchingPlan:
         plan = self._subtree(a, b, D)
@@ -225,6 +292,8 @@ class Matching:
         """Return the best plan of two bodies whose parents have the frames D_parent."""
         ours, theirs = self.ours.placements[a], self.theirs.placements[b]
         followed = inverse(ours) @ D_parent @ theirs
+        if self.ours.kinds[a] == "ball":
+            return self._turned(a, b, followed)
         unmoved = self._is_unmoved(a, b)
         if unmoved and not _is_identity(followed) and self._axis_cost(a, b, followed) > 0.0:
             return self._chosen(a, b, np.eye(4), _cost(self._has_equal_origins(a, b)))
@@ -295,7 +364,7 @@ class Matching:
             p = axis * float(axis @ D[:3, 3])
             if float(mine.mass) > 0.0 and float(theirs.mass) > 0.0:
                 at = mine.first_moment / mine.mass - R @ (theirs.first_moment / theirs.mass)
-                p = axis * float(axis @ at) if self.ours.bodies[a].revolute else at
+                p = axis * float(axis @ at) if self.ours.kinds[a] == "revolute" else at
             yield homogeneous(R, p)
 
     def _candidates_of(self, a: int, b: int) -> Iterator[Floats]:
@@ -396,7 +465,7 @@ class Matching:
         return opposite, len(list(limit_differences(*limits, -1 if opposite else 1, self.tolerance)))
 
     def _alike(self, i: int, j: int) -> bool:
-        return self.ours.bodies[i].revolute == self.theirs.bodies[j].revolute
+        return self.ours.kinds[i] == self.theirs.kinds[j]
 
     def _distance(self, i: int, j: int, D: Floats) -> float:
         """Return how far apart two joints of matched parents are, relative to the size of the robot."""
@@ -404,19 +473,23 @@ class Matching:
         mine, my_axis = self.ours.placements[i], self.ours.axes[i]
         direction, mine_direction = T[:3, :3] @ axis, mine[:3, :3] @ my_axis
         offset = T[:3, 3] - mine[:3, 3]
-        if self.ours.bodies[i].revolute:
+        kind = self.ours.kinds[i]
+        if kind == "revolute":
             offset = cross(offset, mine_direction)
         sizes = abs(self.ours.sizes[i] - self.theirs.sizes[j])
-        sine = float(np.linalg.norm(cross(direction, mine_direction)))
+        sine = 0.0 if kind == "ball" else float(np.linalg.norm(cross(direction, mine_direction)))
         mass = abs(float(self.ours.inertias[i].mass - self.theirs.inertias[j].mass))
         total = abs(float(self.ours.inertias[i].mass)) + abs(float(self.theirs.inertias[j].mass)) or 1.0
         roles = (self.ours.joints[i].mimic is None) != (self.theirs.joints[j].mimic is None)
-        own = self._own_cost(i, j, inverse(mine) @ T)
+        followed = inverse(mine) @ T
+        own = min(self._own_cost(i, j, D) for D in self._free_frames(i, j, followed))
         apart = float(np.linalg.norm(offset)) / self.length + sine
         return apart + sizes + 0.1 * mass / total + 0.5 * roles + 0.2 * own
 
     def _cosine(self, a: int, b: int, D: Floats) -> float:
-        """Return the cosine of the angle between the axes of two bodies."""
+        """Return the cosine of the angle between the axes of two bodies; 1 for ball joints."""
+        if self.ours.kinds[a] == "ball":
+            return 1.0
         return float(D[:3, :3] @ self.theirs.axes[b] @ self.ours.axes[a])
 
     def _key(self, a: int, b: int, D: Floats) -> Key:
@@ -451,11 +524,15 @@ class Matching:
 
     def _axis_cost(self, a: int, b: int, D: Floats) -> float:
         """Return how many elements must be replaced for the joint axes of two bodies to coincide."""
+        if self.ours.kinds[a] == "ball":
+            # Where the centre is elsewhere, the joint is moved and what is attached to its link moved back.
+            away = float(np.linalg.norm(D[:3, 3])) > self.tolerance * self.length
+            return 1.0 + attachments(self.theirs, b) if away else 0.0
         axis, mine = D[:3, :3] @ self.theirs.axes[b], self.ours.axes[a]
         cost = 0.0
         if float(np.linalg.norm(cross(axis, mine))) > self.tolerance:
             cost = _cost(self.ours.joints[a].axis == self.theirs.joints[b].axis)
-        if self.ours.bodies[a].revolute:
+        if self.ours.kinds[a] == "revolute":
             off = float(np.linalg.norm(cross(D[:3, 3], mine)))
             if off > self.tolerance * self.length:
                 # The joint must be moved and what is attached to its link moved back.
@@ -507,11 +584,8 @@ class Matching:
         if a == ROOT or self._has_equal_inertials(a, b):
             # What is written alike and differs here is in another frame.
             return False
-        Q = self._axis_frames[a]
-        turned = difference.transform(Q.T, np.zeros(3))
-        remaining, _ = split_inertia(turned, self.ours.bodies[a].revolute)
-        back: RigidInertia = remaining.transform(Q, np.zeros(3))
-        return inertia_ratio(back, mine, self.ours.whole) <= self.tolerance
+        unshared = self.ours.unshared(a, difference)
+        return inertia_ratio(unshared, mine, self.ours.whole) <= self.tolerance
 
     def _has_other_center(self, a: int, b: int, D: Floats) -> bool:
         """Check whether mass or first moment differ already, which takes a tenth of the time of all."""
@@ -524,7 +598,11 @@ class Matching:
             size = self._sizes[a] = extent(mine, self.ours.whole)
         limit = self.tolerance * abs(mass) * size
         offset = mine.first_moment - D[:3, :3] @ other.first_moment - other.mass * D[:3, 3]
-        if a != ROOT and self.ours.bodies[a].revolute and not self._has_equal_inertials(a, b):
+        kind = None if a == ROOT or self._has_equal_inertials(a, b) else self.ours.kinds[a]
+        if kind == "ball":
+            # The mass may belong to the parent.
+            return bool(np.linalg.norm(offset) > (1.0 + MARGIN) * limit)
+        if kind == "revolute":
             # The mass, and what it has along the axis, may belong to the parent.
             axis = self.ours.axes[a]
             return bool(np.linalg.norm(offset - axis * (axis @ offset)) > (1.0 + MARGIN) * limit)
@@ -547,7 +625,7 @@ def _lost(skeleton: Skeleton, other: Skeleton, body: int) -> float:
     """Return the cost of a body without counterpart and of all below it. If the other robot has a joint of
     that name, both are one subtree at another place, whose halves cost 1 each."""
     known = other.number.get(skeleton.joints[body].name)
-    if known is not None and skeleton.bodies[body].revolute == other.bodies[known].revolute:
+    if known is not None and skeleton.kinds[body] == other.kinds[known]:
         return 1.0
     return 2.0 * skeleton.sizes[body]
 

@@ -34,7 +34,7 @@ NULL = 1e-8
 Ints = NDArray[np.int64]
 
 Differences = Mapping[int, RigidInertia]
-"""Difference of the inertia of some bodies, by the number of the body."""
+"""Difference of the inertia of some bodies, by the number of the body in the mechanism."""
 
 
 @lru_cache(maxsize=1)
@@ -58,21 +58,22 @@ class Observability:
         self._own = {number: float_inertia(inertia) for number, inertia in enumerate(inertias, ROOT)}
 
     def regrouped(self, body: int, difference: RigidInertia) -> Differences:
-        """Move the parameters of a difference of one body to the bodies at which they are seen: those that
-        may belong to the parent of a joint are the parent's."""
+        """Move the parameters of a difference of one body of the skeleton to the bodies of the mechanism at
+        which they are seen: those that may belong to the parent of a joint are the parent's."""
         aligned, frames = self._aligned, self._frames
+        body = ROOT if body == ROOT else self._skeleton.numbers[body]
         found: dict[int, RigidInertia] = {}
         moved: RigidInertia = difference.transform(*frames[body])
         while body != ROOT:
             joint = aligned.bodies[body]
-            found[body], redundant = split_inertia(moved, joint.revolute)
+            found[body], redundant = split_inertia(moved, joint.revolute, joint.ball is not None)
             moved, body = redundant.transform(joint.R, joint.p), joint.parent
         found[ROOT] = moved
         return found
 
     def seen(self, regrouped: Iterable[Differences]) -> dict[int, float]:
-        """Return, for each body in whose parameters the sum of some regrouped differences is seen, its size
-        relative to the scale of the body (`inertia_ratio`)."""
+        """Return, for each body of the skeleton in whose parameters the sum of some regrouped differences is
+        seen, its size relative to the scale of the body (`inertia_ratio`)."""
         total: dict[int, RigidInertia] = {}
         for each in regrouped:
             for body, inertia in each.items():
@@ -84,9 +85,9 @@ class Observability:
         if not self._skeleton.model.floating:
             remaining.pop(ROOT, None)
         ratios = {body: ratio for body, (_, ratio) in remaining.items() if ratio > 0.0}
-        if not ratios or (self._skeleton.model.floating and self._mechanism.coupling is None):
-            return ratios
-        return self._projected({body: remaining[body][0] for body in ratios}, ratios)
+        if ratios and not (self._skeleton.model.floating and self._mechanism.coupling is None):
+            ratios = self._projected({body: remaining[body][0] for body in ratios}, ratios)
+        return {self._skeleton.number_of[body]: ratio for body, ratio in ratios.items()}
 
     def _projected(self, inertias: Differences, ratios: dict[int, float]) -> dict[int, float]:
         """Remove the part in the null space of the regressor, which is taken at the bodies that differ."""
@@ -138,6 +139,8 @@ class Observability:
         q = rng.uniform(-1.5, 1.5, (STATES, aligned.nq))
         if model.floating:
             q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
+        for first in aligned.ball_places:
+            q[:, first : first + 4] /= np.linalg.norm(q[:, first : first + 4], axis=1, keepdims=True)
         q = _coupled_q(aligned, q)
         S = np.eye(aligned.nv) if aligned.coupling is None else aligned.coupling.matrix()
         v, a = (rng.standard_normal((STATES, S.shape[1])) @ S.T for _ in range(2))

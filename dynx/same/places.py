@@ -63,4 +63,4 @@ def _world(model: Model) -> PlaceInBody:
 
 
 def _frames(skeleton: Skeleton) -> dict[str, BodyFrame]:
-    return {frame.name: frame for frame in skeleton.mechanism.frames}
+    return {frame.name: frame for frame in skeleton.frames}

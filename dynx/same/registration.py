@@ -8,7 +8,7 @@ Two lines, or a line and a point off it, determine the transform up to the signs
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations, islice, product
+from itertools import combinations, islice, permutations, product
 
 import numpy as np
 
@@ -30,6 +30,15 @@ SYMMETRIC = 1e-6
 MAX_LINES = 4
 """Largest number of joint axes of a body from which pairs are made."""
 
+MAX_PAIRINGS = 24
+"""Largest number of ways to pair the bodies of two robots that are tried."""
+
+MAX_LIKE_JOINTS = 4
+"""Largest number of like joints of one body of which all orders are tried."""
+
+DIGITS_APART = 6
+"""Decimals in which relative differences of inertias are compared: those below are rounding."""
+
 Line = tuple[Floats, Floats]
 """A point (3,) and a unit direction (3,)."""
 
@@ -39,14 +48,19 @@ MAX_DEPTH = 4
 
 
 def candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int, depth: int = 0) -> Iterator[Floats]:
-    """Yield poses (4, 4) that the frame of body b of `theirs` may have in the frame of body a of `ours`."""
+    """Yield poses (4, 4) that the frame of body b of `theirs` may have in the frame of body a of `ours`; of a
+    body on a ball joint their rotations alone count."""
     yield from _own_candidates(ours, theirs, a, b)
-    if a == b == ROOT:
-        yield from arrangements(ours, theirs, _counterparts(ours, theirs))
-    if depth >= MAX_DEPTH or (a != ROOT and depth == 0):
-        # Only the frame of a floating root follows from no other.
+    free = is_free(ours, a)
+    if free and depth == 0:
+        for pairs in _pairings(ours, theirs, a, b):
+            yield from arrangements(ours, theirs, pairs)
+    if depth >= MAX_DEPTH or (not free and depth == 0):
+        # Only the frame of a floating root, or of a body on a ball joint, follows from no other.
         return
     for i, j in _children(ours, theirs, a, b):
+        if ours.kinds[i] == "ball":
+            continue
         back = inverse(theirs.placements[j])
         for D in candidates(ours, theirs, i, j, depth + 1):
             yield ours.placements[i] @ D @ back
@@ -56,25 +70,78 @@ def _children(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> list[tuple[in
     """Return the child bodies of both that may be counterparts: those with the same name, or else all that
     are of one kind."""
     left, right = ours.children[a], theirs.children[b]
-    names = {theirs.joints[j].name: j for j in right}
-    pairs = [(i, names[ours.joints[i].name]) for i in left if ours.joints[i].name in names]
+    pairs = _namesakes(ours, theirs, a, b)
     if not pairs:
-        pairs = [(i, j) for i in left for j in right if ours.bodies[i].revolute == theirs.bodies[j].revolute]
+        pairs = [(i, j) for i in left for j in right if ours.kinds[i] == theirs.kinds[j]]
         pairs = [(i, j) for i, j in pairs if ours.sizes[i] == theirs.sizes[j]]
     return pairs[:MAX_LINES]
 
 
-def _counterparts(ours: Skeleton, theirs: Skeleton) -> list[tuple[int, int]]:
-    """Return the bodies of both robots that may be counterparts, each once, parents first."""
-    found = {ROOT: ROOT}
-    waiting = [(ROOT, ROOT)]
-    while waiting:
-        a, b = waiting.pop(0)
-        for i, j in _children(ours, theirs, a, b):
-            if i not in found and j not in found.values():
-                found[i] = j
-                waiting.append((i, j))
-    return list(found.items())
+def _namesakes(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> list[tuple[int, int]]:
+    names = {theirs.joints[j].name: j for j in theirs.children[b]}
+    pairs = ((i, names.get(ours.joints[i].name)) for i in ours.children[a])
+    return [(i, j) for i, j in pairs if j is not None and ours.kinds[i] == theirs.kinds[j]]
+
+
+def _pairings(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterator[list[tuple[int, int]]]:
+    """Yield lists of the bodies of two subtrees that may be counterparts, parents first, each once: up to
+    `MAX_PAIRINGS`. Bodies below a ball joint, whose pose is not known, are left out.
+
+    Joints with the same names are counterparts. The others are so if their kinds and what is below them are
+    alike; among several that are, each order is tried, those first whose inertias are nearest.
+    """
+    yield from islice(_extended(ours, theirs, [(a, b)], 0), MAX_PAIRINGS)
+
+
+def _extended(
+    ours: Skeleton, theirs: Skeleton, pairs: list[tuple[int, int]], done: int
+) -> Iterator[list[tuple[int, int]]]:
+    """Yield the pairings that begin with `pairs`, of which the first `done` have their children in it."""
+    if done == len(pairs):
+        yield pairs
+        return
+    a, b = pairs[done]
+    if done and ours.kinds[a] == "ball":
+        yield from _extended(ours, theirs, pairs, done + 1)
+        return
+    for children in _orders(ours, theirs, a, b):
+        yield from _extended(ours, theirs, [*pairs, *children], done + 1)
+
+
+def _orders(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterator[list[tuple[int, int]]]:
+    """Yield the ways to pair the children of two bodies."""
+    named = _namesakes(ours, theirs, a, b)
+    left = [i for i in ours.children[a] if i not in {i for i, _ in named}]
+    right = [j for j in theirs.children[b] if j not in {j for _, j in named}]
+    groups: dict[object, tuple[list[int], list[int]]] = {}
+    for which, (skeleton, bodies) in enumerate(((ours, left), (theirs, right))):
+        for body in bodies:
+            groups.setdefault(skeleton.shape_of(body), ([], []))[which].append(body)
+    yield from (
+        [*named, *(pair for some in chosen for pair in some)]
+        for chosen in product(*(_matched(ours, theirs, *group) for group in groups.values()))
+    )
+
+
+def _matched(
+    ours: Skeleton, theirs: Skeleton, left: list[int], right: list[int]
+) -> list[list[tuple[int, int]]]:
+    """Return the ways to pair bodies of one shape, those first whose inertias are nearest."""
+    count = min(len(left), len(right))
+    if len(left) > MAX_LIKE_JOINTS or len(right) > MAX_LIKE_JOINTS:
+        return [list(zip(left, right, strict=False))]
+    apart = {(i, j): _apart(ours.invariants(i), theirs.invariants(j)) for i in left for j in right}
+    several = [
+        list(zip(some, order, strict=True))
+        for some in combinations(left, count)
+        for order in permutations(right, count)
+    ]
+    return sorted(several, key=lambda pairs: round(sum(apart[pair] for pair in pairs), DIGITS_APART))
+
+
+def _apart(one: Floats, other: Floats) -> float:
+    """Return how far invariants are apart, relative to the larger ones."""
+    return float(np.sum(np.abs(one - other) / np.maximum(np.maximum(np.abs(one), np.abs(other)), 1e-300)))
 
 
 def _own_candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterator[Floats]:
@@ -85,9 +152,9 @@ def _own_candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterato
         if mine is not None:
             yield rounded(ours.link_pose(mine)) @ inverse(rounded(theirs.link_pose(k)))
     pairs = [(ours.inertias[a], theirs.inertias[b])]
-    if a == b == ROOT:
+    if is_free(ours, a):
         # The centre of mass moves where a part of the inertia is stated in another body.
-        pairs.append((ours.grouped[ROOT], theirs.grouped[ROOT]))
+        pairs.append((ours.grouped[a], theirs.grouped[b]))
     for first, second in pairs:
         frames = zip(_frames(ours, a, first), _frames(theirs, b, second), strict=False)
         for mine_frames, their_frames in frames:
@@ -104,10 +171,16 @@ def _frames(skeleton: Skeleton, body: int, inertia: RigidInertia) -> Iterator[li
     lines += [
         _line(skeleton, child)
         for child in skeleton.children[body][:MAX_LINES]
-        if skeleton.bodies[child].revolute
+        if skeleton.kinds[child] == "revolute"
     ]
     mass = float(inertia.mass)
     center = inertia.first_moment / mass if mass > 0.0 else None
+    if body != ROOT and skeleton.kinds[body] == "ball":
+        # The mass may be the parent's: what stays are the tensor and the first moment about the centre.
+        inertia = RigidInertia(np.ones(()), np.zeros(3), inertia.rotational_inertia)
+        length = float(np.linalg.norm(center)) if center is not None else 0.0
+        lines += [] if center is None or length == 0.0 else [(np.zeros(3), center / length)]
+        center = np.zeros(3)
     if center is None:
         yield []
     else:
@@ -115,6 +188,7 @@ def _frames(skeleton: Skeleton, body: int, inertia: RigidInertia) -> Iterator[li
         yield principal
         lines += [(center, axis) for axis in symmetric]
     lines += list(_lines_of_slides(skeleton, body, center))
+    lines += list(_lines_of_centers(skeleton, body, center))
     for line in lines:
         yield [] if center is None else _frames_of_point(line, center)
     for one, other in combinations(lines, 2):
@@ -124,7 +198,7 @@ def _frames(skeleton: Skeleton, body: int, inertia: RigidInertia) -> Iterator[li
 
 
 def _own_line(skeleton: Skeleton, body: int) -> Line | None:
-    if body == ROOT or not skeleton.bodies[body].revolute:
+    if body == ROOT or skeleton.kinds[body] != "revolute":
         return None
     return np.zeros(3), skeleton.axes[body]
 
@@ -137,7 +211,7 @@ def _line(skeleton: Skeleton, child: int) -> Line:
 def _lines_of_slides(skeleton: Skeleton, body: int, center: Floats | None) -> Iterator[Line]:
     """Yield the directions of prismatic joints at a body, through its centre of mass, and the lines from that
     to the centres of mass of what slides. A slide has a direction, and no point of its own."""
-    slides = (each for each in skeleton.children[body] if not skeleton.bodies[each].revolute)
+    slides = (each for each in skeleton.children[body] if skeleton.kinds[each] == "prismatic")
     for child in islice(slides, MAX_LINES):
         start, direction = _line(skeleton, child)
         yield (start if center is None else center), direction
@@ -149,6 +223,28 @@ def _lines_of_slides(skeleton: Skeleton, body: int, center: Floats | None) -> It
         length = float(np.linalg.norm(away))
         if length > PARALLEL * float(np.linalg.norm(center)):
             yield center, away / length
+
+
+def _lines_of_centers(skeleton: Skeleton, body: int, center: Floats | None) -> Iterator[Line]:
+    """Yield the lines between the centre of mass and the centres of the ball joints at a body."""
+    points = [skeleton.placements[child][:3, 3] for child in skeleton.children[body][: 2 * MAX_LINES]]
+    points = [
+        point
+        for child, point in zip(skeleton.children[body], points, strict=False)
+        if skeleton.kinds[child] == "ball"
+    ][:MAX_LINES]
+    if center is not None:
+        points.insert(0, center)
+    for one, other in combinations(points, 2):
+        length = float(np.linalg.norm(other - one))
+        if length > PARALLEL * skeleton.reach:
+            yield one, (other - one) / length
+
+
+def is_free(skeleton: Skeleton, body: int) -> bool:
+    """Check whether the orientation of a body's frame follows from no other: that of a root, or of a body on
+    a ball joint."""
+    return body == ROOT or skeleton.kinds[body] == "ball"
 
 
 def principal_frames(inertia: RigidInertia) -> tuple[list[Floats], list[Floats]]:

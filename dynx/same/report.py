@@ -70,13 +70,22 @@ class Unmatched:
 @dataclass(frozen=True)
 class Coordinate:
     """A coordinate of the first robot, ``q_first[first_index] = sign * q_second[second_index]``; the same
-    sign and indices, less 1 with a floating base, hold for velocity and torque."""
+    sign holds for velocity and torque, at `first_velocity_index` and `second_velocity_index`.
+
+    A ball joint has a quaternion (x, y, z, w) from that index on: with the quaternions `before` and `after`,
+    which are None for other joints, ``q_first = before * q_second * after``. Its angular velocity and torque
+    (3,) are ``R(after).T`` times those of the second robot.
+    """
 
     ours: str
     theirs: str
     first_index: int
     second_index: int
     sign: int
+    first_velocity_index: int
+    second_velocity_index: int
+    before: tuple[float, float, float, float] | None = None
+    after: tuple[float, float, float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -100,4 +100,4 @@ class _Objects:
 
 
 def _frames(skeleton: Skeleton) -> dict[str, BodyFrame]:
-    return {frame.name: frame for frame in skeleton.mechanism.frames}
+    return {frame.name: frame for frame in skeleton.frames}

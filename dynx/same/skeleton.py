@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from dynx.model import Model
 from dynx.model.elements import IDENTITY, Inertial, Joint, Pose
-from dynx.model.mechanism import ROOT, Body, Mechanism, build_mechanism
+from dynx.model.mechanism import ROOT, Body, BodyFrame, Mechanism, build_mechanism
 from dynx.model.topology import lock_joint
+from dynx.rbd.base_parameters import rotation_to_axis, split_inertia
 from dynx.same.decimals import decimals, fifty_digits, rounded
 from dynx.same.scales import Whole
 from dynx.spatial.inertia import RigidInertia
@@ -58,6 +60,10 @@ def transformed(inertia: RigidInertia, T: Array) -> RigidInertia:
     return inertia.transform(T[:3, :3], T[:3, 3])
 
 
+JointKind = Literal["revolute", "prismatic", "ball"]
+"""Motion of a joint; a continuous joint is revolute."""
+
+
 ALIKE = 1e-12
 """Difference of two numbers that are the same but for rounding, relative to the largest of their kind."""
 
@@ -85,30 +91,46 @@ def _numbers_of(inertial: Inertial) -> tuple[Floats, Floats, Floats]:
 
 
 class Skeleton:
-    """Bodies of a model, numbered as in its mechanism; ROOT is the root body.
+    """Bodies of a model, one for each joint that moves, in the order of its mechanism; ROOT is the root body.
 
-    Build it inside `fifty_digits`. Poses T (4, 4) of joints are those in the body of the parent, at
-    position 0.
+    The three bodies of a ball joint in the mechanism are one here; `numbers` are the mechanism's. Build it
+    inside `fifty_digits`. Poses T (4, 4) of joints are those in the body of the parent, at position 0.
     """
 
     def __init__(self, model: Model) -> None:
         self.model = model
         self.mechanism: Mechanism = build_mechanism(model, decimals)
         self.joints: tuple[Joint, ...] = tuple(joint for joint in model.joints if joint.moves)
-        self.bodies: tuple[Body, ...] = self.mechanism.bodies
+        self.numbers: tuple[int, ...] = tuple(
+            number for number, body in enumerate(self.mechanism.bodies) if body.ball in (None, 2)
+        )
+        self.number_of: dict[int, int] = {ROOT: ROOT} | {number: k for k, number in enumerate(self.numbers)}
+        self.bodies: tuple[Body, ...] = tuple(self._body(number) for number in self.numbers)
+        self.kinds: tuple[JointKind, ...] = tuple(
+            "prismatic" if not body.revolute else "revolute" if body.ball is None else "ball"
+            for body in self.bodies
+        )
+        self.frames: tuple[BodyFrame, ...] = tuple(
+            replace(frame, body=self.number_of[frame.body]) for frame in self.mechanism.frames
+        )
         self.exact = [homogeneous(body.R, body.p) for body in self.bodies]
         self.placements: list[Floats] = [rounded(T) for T in self.exact]
         self.axes: list[Floats] = [rounded(body.axis) for body in self.bodies]
         self.children: dict[int, list[int]] = {body: [] for body in range(ROOT, len(self.bodies))}
         for number, body in enumerate(self.bodies):
             self.children[body.parent].append(number)
-        self.body_of = {
-            link.name: frame.body for link, frame in zip(model.links, self.mechanism.frames, strict=False)
-        }
+        self.body_of = {link.name: frame.body for link, frame in zip(model.links, self.frames, strict=False)}
         self.links: dict[int, list[int]] = {body: [] for body in self.children}
         for number, link in enumerate(model.links):
             self.links[self.body_of[link.name]].append(number)
         self.number = {joint.name: k for k, joint in enumerate(self.joints)}
+
+    def _body(self, number: int) -> Body:
+        """Return a body of the mechanism; the last one of a ball joint, with the place of the first."""
+        bodies = self.mechanism.bodies
+        body = bodies[number]
+        first = body if body.ball is None else bodies[number - body.ball]
+        return replace(first, parent=self.number_of[first.parent], inertia=body.inertia)
 
     def inertia(self, body: int) -> RigidInertia:
         """Return the merged inertia of a body in 50 digits, in its frame."""
@@ -127,7 +149,7 @@ class Skeleton:
             for k in numbers:
                 inertial = self.model.links[k].inertial
                 if inertial is not None and (inertial.mass or inertial.tensor.any()):
-                    frame = self.mechanism.frames[k]
+                    frame = self.frames[k]
                     own = float_inertia(self.mechanism.links[k].inertia)
                     moved = own.transform(rounded(frame.R), rounded(frame.p))
                     found[body][self.model.links[k].name] = moved
@@ -140,13 +162,16 @@ class Skeleton:
 
         Of a body on a revolute joint that is its mass, its first moment along the axis, and the mean of its
         moments about the axes across; of one on a prismatic joint its tensor about the centre of mass
-        (Gautier and Khalil 1990). An exchange of inertia that no state shows leaves that of the root alone.
+        (Gautier and Khalil 1990); of one on a ball joint its mass at the centre of the joint. An exchange of
+        inertia that no state shows leaves that of the root alone.
         """
         total = dict(self.inertias)
         for number in reversed(range(len(self.bodies))):
             inertia, axis, T = total[number], self.axes[number], self.placements[number]
             along = np.outer(axis, axis)
-            if self.bodies[number].revolute:
+            if self.kinds[number] == "ball":
+                moved = RigidInertia(inertia.mass, np.zeros(3), np.zeros((3, 3)))
+            elif self.kinds[number] == "revolute":
                 tensor = inertia.rotational_inertia
                 across = (np.trace(tensor) - axis @ tensor @ axis) / 2.0 * (np.eye(3) - along)
                 moved = RigidInertia(inertia.mass, along @ inertia.first_moment, across)
@@ -160,12 +185,12 @@ class Skeleton:
 
     def link_pose(self, link: int) -> Array:
         """Return the pose (4, 4) of a link, by its number, in the frame of its body, in 50 digits."""
-        frame = self.mechanism.frames[link]
+        frame = self.frames[link]
         return homogeneous(frame.R, frame.p)
 
     def link_inertia(self, link: int) -> RigidInertia:
         """Return the inertia of a link in 50 digits, in the frame of its body."""
-        frame = self.mechanism.frames[link]
+        frame = self.frames[link]
         return self.mechanism.links[link].inertia.transform(frame.R, frame.p)
 
     def parent_pose(self, body: int) -> Array:
@@ -181,7 +206,7 @@ class Skeleton:
         for number, body in enumerate(self.bodies):
             length = float(np.linalg.norm(self.placements[number][:3, 3]))
             path[number] = path[body.parent] + length + self.travel(number)
-        ends = [path[frame.body] + float(np.linalg.norm(rounded(frame.p))) for frame in self.mechanism.frames]
+        ends = [path[frame.body] + float(np.linalg.norm(rounded(frame.p))) for frame in self.frames]
         ends += [path[number] + radius(inertia) for number, inertia in self.inertias.items()]
         return max(ends) or 1.0
 
@@ -192,12 +217,26 @@ class Skeleton:
 
     def travel(self, body: int) -> float:
         """Return the largest distance [m] that a prismatic joint moves from 0; 0 without limits, and for a
-        revolute joint."""
+        revolute or ball joint."""
         limits = self.joints[body].limits
-        if self.bodies[body].revolute:
+        if self.kinds[body] != "prismatic":
             return 0.0
         ends = [abs(end) for end in (limits.lower, limits.upper)]
         return max((end for end in ends if np.isfinite(end)), default=0.0)
+
+    def unshared(self, body: int, inertia: RigidInertia) -> RigidInertia:
+        """Return what of an inertia of a body (float64) cannot be its parent's as well."""
+        if self.kinds[body] == "ball":
+            return split_inertia(inertia, revolute=True, ball=True)[0]
+        Q = self._axis_frames[body]
+        turned = inertia.transform(Q.T, np.zeros(3))
+        remaining, _ = split_inertia(turned, self.kinds[body] == "revolute")
+        back: RigidInertia = remaining.transform(Q, np.zeros(3))
+        return back
+
+    @cached_property
+    def _axis_frames(self) -> list[Floats]:
+        return [rotation_to_axis(np.eye(3), axis) for axis in self.axes]
 
     @cached_property
     def depth(self) -> int:
@@ -214,6 +253,32 @@ class Skeleton:
         for number in reversed(range(len(self.bodies))):
             sizes[self.bodies[number].parent] += sizes[number]
         return sizes
+
+    @cached_property
+    def _shapes(self) -> dict[int, tuple[object, ...]]:
+        found: dict[int, tuple[object, ...]] = {}
+        for number in reversed(range(len(self.bodies))):
+            below = sorted((found[child] for child in self.children[number]), key=repr)
+            found[number] = (self.kinds[number], *below)
+        return found
+
+    def shape_of(self, body: int) -> tuple[object, ...]:
+        """Return the kinds of the joint of a body and of all below it, the same for each order of them."""
+        return self._shapes[body]
+
+    def invariants(self, body: int) -> Floats:
+        """Return numbers (n,) of the inertia of a body that no exchange with its parent and no turn of its
+        frame about its joint changes."""
+        inertia, axis = self.grouped[body], self.axes[body]
+        h, tensor = inertia.first_moment, inertia.rotational_inertia
+        if self.kinds[body] == "prismatic":
+            return np.array([float(inertia.mass)])
+        if self.kinds[body] == "ball":
+            return np.array([float(np.linalg.norm(h)), *np.linalg.eigvalsh(tensor).tolist()])
+        # Along the axis the origin may be anywhere; about it, the moments across may be turned.
+        across = np.eye(3) - np.outer(axis, axis)
+        low, high = np.sort(np.abs(np.linalg.eigvalsh(across @ tensor @ across)))[1:].tolist()
+        return np.array([float(np.linalg.norm(across @ h)), float(axis @ tensor @ axis), high - low])
 
 
 def radius(inertia: RigidInertia) -> float:

@@ -37,6 +37,8 @@ def with_moved_frames(model: Model, rng: np.random.Generator) -> Model:
         shift = rng.uniform(-0.3, 0.3, 3)
         if joint.type in ("revolute", "continuous"):
             shift = np.array(joint.axis) * shift[0]
+        if joint.type == "ball":
+            shift = np.zeros(3)
         frames[joint.child] = homogeneous(random_rotation(rng), shift)
     joints = []
     for joint in model.joints:
@@ -64,7 +66,7 @@ def with_flipped_axes(model: Model, rng: np.random.Generator) -> Model:
     joints = []
     for joint in model.joints:
         sign = signs[joint.name]
-        if not joint.moves:
+        if not joint.moves or joint.type == "ball":
             joints.append(joint)
             continue
         limits, mimic = joint.limits, joint.mimic
