@@ -124,8 +124,6 @@ REFUSED: dict[str, Callable[[Path], object]] = {
     "Encoders": lambda folder: control.Encoders(
         control.PD(MODEL, kp=1.0, kd=1.0), resolution=0.1, control_dt=0.01
     ),
-    "same_robot of models": lambda folder: dynx.same_robot(MODEL, STRAIGHT),
-    "same_robot of files": of_file(lambda path: dynx.same_robot(path, path)),
     "diagnose a model": lambda folder: raised(dynx.diagnose(MODEL)),
     "dynx/Reach": of_file(reach),
     "lock": lambda folder: dynx.load(MODEL, lock={"shoulder": 0.1}),
@@ -139,6 +137,7 @@ COMMANDS_THAT_COMPUTE = (
     ("fd", "ROBOT", "--tau", "1,2,3,4"),
     ("mass", "ROBOT"),
     ("convert", "ROBOT", "--to", "sdf"),
+    ("same", "ROBOT", "ROBOT"),
     ("agree", "ROBOT", "--backends", "reference,compiled"),
     ("agree", "ROBOT", "--samples", "3"),
     ("sim", "ROBOT", "--duration", "0.1"),
@@ -149,7 +148,6 @@ COMMANDS_THAT_COMPUTE = (
 COMMANDS_THAT_REFUSE = (
     ("id", "ROBOT", "--v", "shoulder=1"),
     ("convert", "ROBOT", "--to", "urdf"),
-    ("same", "ROBOT", "ROBOT"),
 )
 
 
