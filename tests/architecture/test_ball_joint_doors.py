@@ -38,7 +38,6 @@ MODEL = Model.build(
     ],
 )
 Q, V = MODEL.random(0), np.array([0.3, -0.4, 0.5, 0.6])
-STRAIGHT = Model.build("straight", LINKS[:2], [Joint("hinge", "revolute", "base", "upper")])
 TAKING = [name for name in backend_names() if backend_class(name).takes_ball_joints]
 
 
