@@ -26,7 +26,7 @@ from dynx.rbd.contact_step import (
     contact_step,
 )
 from dynx.spatial.scalar import Array, Floats
-from dynx.steppers.layout import Layout, stop_positions
+from dynx.steppers.layout import WORLD, Layout, stop_positions
 from dynx.steppers.material import contact_material
 
 INPUTS = ("friction", "gravity", "kp", "kd", "max_torque")
@@ -147,9 +147,12 @@ def shapes_on_plane(layout: Layout, *, deepest: bool = False) -> ShapesOnPlane:
             kind = type(ground.shape).__name__
             if not isinstance(ground.shape, Plane):
                 raise UnsupportedFeatureError(f"{other.name} is a {kind}; the ground of a kernel is a plane")
-            if plane is not None and not np.array_equal(plane, ground.T):
+            owner = other.owner
+            of_body = owner.robot is None and owner.body != WORLD
+            T = layout.bodies[owner.body].T @ ground.T if of_body else ground.T
+            if plane is not None and not np.array_equal(plane, T):
                 raise UnsupportedFeatureError(f"{other.name} is a second plane; a kernel has one")
-            plane = ground.T
+            plane = T
         material = contact_material(own.material, other.material)
         for name in ("restitution", "torsional_friction", "rolling_friction"):
             if getattr(material, name):

@@ -22,11 +22,15 @@ import numpy as np
 
 from dynx.rbd.constraints import TINY, disk_share, largest_eigenvalue, norm
 from dynx.rbd.eliminated_rows import EliminatedRows
-from dynx.spatial.scalar import Array, maximum, minimum
+from dynx.spatial.scalar import Array, less, maximum, minimum, select
 
 INNER = 2
 """Solutions of normal and tangents one after the other in a visit of a contact. Two of them in a visit
 reduce the residual as much as two visits, because the rows of a point are coupled more than two points."""
+
+IMMOVABLE = 1e-9
+"""Inverse of an effective mass [1/kg or 1/(kg m^2)] up to which an impulse moves nothing, and is none. The
+tip of a fixed arm that cannot move along the normal of the ground has such a row."""
 
 Vector = list[Any]
 Velocities = dict[int, Any]
@@ -59,7 +63,7 @@ class Block:
     scales: Vector
     """Largest eigenvalue of G for the normal and for the tangents, or of a joint's row."""
     inverse: Vector
-    """1 / scales."""
+    """1 / scales; 0 where nothing can move."""
 
 
 def blocks_of(eliminated: EliminatedRows, contacts: int, joints: int) -> list[Block]:
@@ -92,11 +96,12 @@ def _block(eliminated: EliminatedRows, rows: list[int], shared: set[int]) -> Blo
                         alone = alone + product
             own[a][b] = own[b][a] = alone
             G[a][b] = G[b][a] = common + alone
-    scales = [G[0][0] + TINY]
+    scales = [G[0][0]]
     if len(rows) == 3:
-        scales.append(largest_eigenvalue(G[1][1], G[2][2], G[1][2]) + TINY)
+        scales.append(largest_eigenvalue(G[1][1], G[2][2], G[1][2]))
+    inverse = [select(less(IMMOVABLE, each), 1.0 / (each + TINY), 0.0) for each in scales]
     Y, Z = ([shared_part(each[row]) for row in rows] for each in (eliminated.Y, eliminated.Z))
-    return Block(rows, Y, Z, own, G, scales, [1.0 / each for each in scales])
+    return Block(rows, Y, Z, own, G, scales, inverse)
 
 
 def impulse_velocities(blocks: Sequence[Block], x: Vector) -> Velocities:
