@@ -21,6 +21,8 @@ from dynx.rbd.contact_geometry import (
     ball_points,
     capsule_on_capsule,
     lowest_of_rim,
+    plane_point_count,
+    plane_points,
 )
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
@@ -64,6 +66,47 @@ def test_the_rim_of_an_upright_cylinder_has_a_point_on_its_disc() -> None:
     point = lowest_of_rim(np.zeros(3), axis, 0.5, axis)
     assert_allclose(point, 0.0, atol=0.5)
     assert point[2] == 0.0
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
+def test_points_on_a_plane_are_those_of_worlds(shape: Shape) -> None:
+    """Each of the world's points is among them, at the same place and gap, and none is lower."""
+    rng = np.random.default_rng(7)
+    for _ in range(60):
+        T, T_plane = random_pose(rng, 1.0), random_pose(rng, 1.0)
+        axes = T_plane[:3, [2, 0, 1]].T
+        offset = axes[0] @ T_plane[:3, 3]
+        found = plane_points(shape, T[:3, :3], T[:3, 3], axes, offset)
+        assert len(found) == plane_point_count(shape)
+        points = contact_points(PlacedSolid(shape, T), PlacedSolid(Plane(), T_plane), FAR)
+        for each in points:
+            gap, point = min(found, key=lambda mine: float(np.linalg.norm(mine[1] - each.point_a)))
+            assert_allclose(point, each.point_a, atol=1e-12)
+            assert gap == pytest.approx(each.gap, abs=1e-12)
+        least = min(each.gap for each in points)
+        assert min(gap for gap, _ in found) == pytest.approx(least, abs=1e-12)
+        ((gap, point),) = plane_points(shape, T[:3, :3], T[:3, 3], axes, offset, deepest=True)
+        assert gap == pytest.approx(least, abs=1e-12)
+        assert axes[0] @ point - offset == pytest.approx(gap, abs=1e-12)
+
+
+def test_a_hull_has_the_lowest_vertex_of_each_quadrant() -> None:
+    rng = np.random.default_rng(8)
+    hull = Mesh("hull.obj")
+    vertices: Floats = rng.standard_normal((20, 3))
+    vertices /= 4.0 * np.linalg.norm(vertices, axis=1, keepdims=True)
+    object.__setattr__(hull, "hull", (vertices, np.zeros((0, 3), dtype=int)))
+    for _ in range(30):
+        T, axes = random_pose(rng, 1.0), np.eye(3)[[2, 0, 1]]
+        found = plane_points(hull, T[:3, :3], T[:3, 3], axes, 0.0)
+        assert len(found) == plane_point_count(hull) == 4
+        corners = vertices @ T[:3, :3].T + T[:3, 3]
+        for gap, point in found:
+            assert gap == pytest.approx(point[2], abs=1e-12)
+            assert np.abs(corners - point).max(axis=1).min() < 1e-12
+        assert min(gap for gap, _ in found) == pytest.approx(corners[:, 2].min(), abs=1e-12)
+        ((gap, _),) = plane_points(hull, T[:3, :3], T[:3, 3], axes, 0.0, deepest=True)
+        assert gap == pytest.approx(corners[:, 2].min(), abs=1e-12)
 
 
 def same(found: SurfaceGap, a: Shape, T_a: Floats, b: Shape, T_b: Floats, tolerance: float = 1e-12) -> None:
