@@ -6,13 +6,13 @@ import math
 from typing import NamedTuple
 
 from dynx.distance.box_separation import box_separation
-from dynx.distance.contact_reduction import TIE, ContactCandidate, largest, reduced
+from dynx.distance.contact_reduction import TIE, ContactCandidate, divided, largest, reduced
 from dynx.distance.cores import BoxCore, Core, CylinderCore, EllipsoidCore, HullCore, PointCore, SegmentCore
 from dynx.distance.distance import distance_of_cores
 from dynx.distance.field_contacts import field_candidates
 from dynx.distance.overlap_polygon import NEAREST, PARALLEL_SINE, overlap
 from dynx.distance.placed_solids import PlacedSolid, placed_cores
-from dynx.distance.plane_contacts import plane_candidates
+from dynx.distance.plane_contacts import fine_rim, plane_candidates
 from dynx.distance.separating_axes import best_axis, tangent_radius
 from dynx.distance.support_features import ContactFrame, SupportFeature, frame_along, support_feature
 from dynx.errors import ArgumentError, DTypeError, shown
@@ -42,19 +42,27 @@ class ContactPoint(NamedTuple):
     feature: tuple[int, int]
     """Numbers of the vertices or edges of a and of b that meet here. They stay the same from step to step as
     long as the same parts touch."""
+    spare: bool = False
+    """True for a point beyond the limit of `contact_points`: the chosen ones bear most loads without it."""
 
     def swapped(self) -> ContactPoint:
         """Return the contact point of b and a."""
         x, y, z = self.normal
-        return ContactPoint(self.point_b, self.point_a, (-x, -y, -z), self.gap, self.feature[::-1])
+        return ContactPoint(
+            self.point_b, self.point_a, (-x, -y, -z), self.gap, self.feature[::-1], self.spare
+        )
 
 
-def contact_points(a: PlacedSolid, b: PlacedSolid, within: float, limit: int = 4) -> tuple[ContactPoint, ...]:
+def contact_points(
+    a: PlacedSolid, b: PlacedSolid, within: float, limit: int = 4, *, spares: bool = False
+) -> tuple[ContactPoint, ...]:
     """Return the contact points of two shapes whose gap is at most `within` [m], at most `limit` of them.
 
     The least gap is the signed distance of the shapes, to 1e-8 of their size. Of more points, those of the
-    largest area remain, and the deepest one. Raises ArgumentError for two grounds (planes, height fields),
-    for a negative `within`, and for a limit below 1; DTypeError for a shape that is not placed.
+    largest area remain, and the deepest one. With `spares` the others follow, marked as such, but for height
+    fields: a load near the edge of a face with many vertices needs them. Raises ArgumentError for two grounds
+    (planes, height fields), for a negative `within`, and for a limit below 1; DTypeError for a shape that is
+    not placed.
     """
     # The engine `dynx` calls this for each pair in each step, so the checks are few.
     for name, shape in (("a", a), ("b", b)):
@@ -69,8 +77,8 @@ def contact_points(a: PlacedSolid, b: PlacedSolid, within: float, limit: int = 4
         raise ArgumentError(f"limit is {limit}; wanted at least 1 contact point")
     order_a, order_b = _order(a), _order(b)
     if order_a > order_b or (order_a == order_b and _position_order(a, b)):
-        return tuple(each.swapped() for each in _in_order(b, a, within, limit))
-    return _in_order(a, b, within, limit)
+        return tuple(each.swapped() for each in _in_order(b, a, within, limit, spares))
+    return _in_order(a, b, within, limit, spares)
 
 
 _KINDS = {PointCore: 0, SegmentCore: 1, EllipsoidCore: 2, CylinderCore: 3, BoxCore: 4, HullCore: 5}
@@ -95,7 +103,9 @@ def _position_order(a: PlacedSolid, b: PlacedSolid) -> bool:
     return dot(a.p, _SKEW) < dot(b.p, _SKEW)
 
 
-def _in_order(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tuple[ContactPoint, ...]:
+def _in_order(
+    a: PlacedSolid, b: PlacedSolid, within: float, limit: int, spares: bool
+) -> tuple[ContactPoint, ...]:
     """Return the contact points of two shapes of which the second is of a later kind."""
     core_a, core_b = a.solid.core, b.solid.core
     if core_a is None:
@@ -104,18 +114,32 @@ def _in_order(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tupl
         if b.solid.field is not None:
             return _of_field(a, b, within, limit)
         normal, found, size = plane_candidates(a, b, within)
-        return _contacts(reduced(found, limit, size), normal)
+        points = _chosen(found, limit, size, normal, spares)
+        if spares and len(found) > 1:
+            points += _contacts(fine_rim(a, b, within), normal, spare=True)
+        return points
     if isinstance(core_a, PointCore) and isinstance(core_b, PointCore):
         return _of_points((a.p, core_a.radius, 0), (b.p, core_b.radius, 0), within, b.axes[2])
     if isinstance(core_a, PointCore | SegmentCore) and isinstance(core_b, SegmentCore):
         return _of_capsules(a, b, within, limit)
     if isinstance(core_a, BoxCore) and isinstance(core_b, BoxCore):
-        return _of_boxes(a, core_a, b, core_b, within, limit)
-    return _of_convex(a, b, within, limit)
+        return _of_boxes(a, core_a, b, core_b, within, limit, spares)
+    return _of_convex(a, b, within, limit, spares)
 
 
-def _contacts(candidates: list[ContactCandidate], normal: Vector3) -> tuple[ContactPoint, ...]:
-    return tuple(ContactPoint(c.point_a, c.point_b, normal, c.gap, c.feature) for c in candidates)
+def _contacts(
+    candidates: list[ContactCandidate], normal: Vector3, *, spare: bool = False
+) -> tuple[ContactPoint, ...]:
+    return tuple(ContactPoint(c.point_a, c.point_b, normal, c.gap, c.feature, spare) for c in candidates)
+
+
+def _chosen(
+    candidates: list[ContactCandidate], limit: int, size: float, normal: Vector3, spares: bool
+) -> tuple[ContactPoint, ...]:
+    """Return the contact points of the candidates that `divided` chooses, and those left over as spares."""
+    chosen, others = divided(candidates, limit, size)
+    found = _contacts(chosen, normal)
+    return found + _contacts(others, normal, spare=True) if spares else found
 
 
 def _of_points(
@@ -210,7 +234,13 @@ def _of_field(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tupl
 
 
 def _of_boxes(
-    a: PlacedSolid, core_a: BoxCore, b: PlacedSolid, core_b: BoxCore, within: float, limit: int
+    a: PlacedSolid,
+    core_a: BoxCore,
+    b: PlacedSolid,
+    core_b: BoxCore,
+    within: float,
+    limit: int,
+    spares: bool,
 ) -> tuple[ContactPoint, ...]:
     between = a.p[0] - b.p[0], a.p[1] - b.p[1], a.p[2] - b.p[2]
     found = box_separation(a.axes, core_a.halves, b.axes, core_b.halves, between, within)
@@ -223,8 +253,8 @@ def _of_boxes(
     # Separated boxes are farther apart than along each axis, unless two of their points show that distance.
     least = min((each.gap for each in candidates), default=math.inf)
     if separation > 0.0 and least > separation + TIE * size:
-        return _of_convex(a, b, within, limit)
-    return _contacts(reduced(candidates, limit, size), normal)
+        return _of_convex(a, b, within, limit, spares)
+    return _chosen(candidates, limit, size, normal, spares)
 
 
 def _features(
@@ -304,14 +334,16 @@ def _along_axis(
     return normal, candidates
 
 
-def _of_convex(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tuple[ContactPoint, ...]:
+def _of_convex(
+    a: PlacedSolid, b: PlacedSolid, within: float, limit: int, spares: bool
+) -> tuple[ContactPoint, ...]:
     """Return the contact points of two bounded shapes by their distance and the features along its normal."""
     core_a, core_b, between = placed_cores(a, b)
     size = core_a.extent + core_a.radius + core_b.extent + core_b.radius
     found = _along_axis(a, core_a, b, core_b, between, within, size)
     if found is not None:
         normal, candidates = found
-        return _contacts(reduced(candidates, limit, size), normal)
+        return _chosen(candidates, limit, size, normal, spares)
     T_a, T_b = a.T, b.T
     T_a[:3, 3], T_b[:3, 3] = between, 0.0
     nearest = distance_of_cores(core_a, T_a, core_b, T_b, within)
@@ -331,4 +363,4 @@ def _of_convex(a: PlacedSolid, b: PlacedSolid, within: float, limit: int) -> tup
         gap = (ax - bx) * x + (ay - by) * y + (az - bz) * z
         place = dot(frame.u, (ax, ay, az)), dot(frame.v, (ax, ay, az))
         candidates.insert(0, ContactCandidate(*place, gap, on_a, on_b, (NEAREST, NEAREST)))
-    return _contacts(reduced(candidates, limit, size), normal)
+    return _chosen(candidates, limit, size, normal, spares)

@@ -35,7 +35,22 @@ class ContactCandidate(NamedTuple):
 
 def reduced(candidates: list[ContactCandidate], limit: int, size: float) -> list[ContactCandidate]:
     """Return at most `limit` candidates at different places, as `largest` chooses them."""
-    return largest(_distinct(candidates, size), limit, size) if len(candidates) > 1 else candidates
+    return divided(candidates, limit, size)[0]
+
+
+def divided(
+    candidates: list[ContactCandidate], limit: int, size: float
+) -> tuple[list[ContactCandidate], list[ContactCandidate]]:
+    """Return at most `limit` candidates at different places, as `largest` chooses them, and those left
+    over."""
+    if len(candidates) < 2:
+        return candidates, []
+    distinct = _distinct(candidates, size)
+    if len(distinct) <= limit:
+        return distinct, []
+    chosen = largest(distinct, limit, size)
+    features = {each.feature for each in chosen}
+    return chosen, [each for each in distinct if each.feature not in features]
 
 
 def largest(candidates: list[ContactCandidate], limit: int, size: float) -> list[ContactCandidate]:

@@ -27,6 +27,17 @@ AddPoint = Callable[[float, float, float, float, int], None]
 GROUND = -1
 """Number of the surface of a half-space."""
 
+FINE_RIM = 16
+"""Number of points of a rim with its spares: their polygon lies inside the disc by at most
+1 - cos(pi / 16) = 1.9 % of the radius."""
+
+FIRST_FINE_RIM = LOWEST_RIM + 2
+"""Number of the first of the fine points of a rim; those of the other end follow."""
+
+_FINE_RIM = [
+    (math.cos(2.0 * math.pi * k / FINE_RIM), math.sin(2.0 * math.pi * k / FINE_RIM)) for k in range(FINE_RIM)
+]
+
 
 def plane_candidates(
     a: PlacedSolid, plane: PlacedSolid, within: float
@@ -45,18 +56,8 @@ def plane_candidates(
     # A quick end for all that is far above the plane.
     if height - size > within:
         return up, [], size
-    frame = frame_along(up)
-    (eu, ev, ew), (fu, fv, fw) = frame.u, frame.v
     found: list[ContactCandidate] = []
-
-    def add(x: float, y: float, z: float, above: float, part: int) -> None:
-        """Add the point of a at an offset from its origin, at a height above the plane."""
-        if above <= within:
-            on_a = px + x, py + y, pz + z
-            on_plane = on_a[0] - above * ux, on_a[1] - above * uy, on_a[2] - above * uz
-            u, v = eu * x + ev * y + ew * z, fu * x + fv * y + fw * z
-            found.append(ContactCandidate(u, v, above, on_a, on_plane, (part, GROUND)))
-
+    add = _adding_to(found, a.p, up, within)
     if isinstance(core, PointCore):
         r = core.radius
         add(-r * ux, -r * uy, -r * uz, height - r, 0)
@@ -81,6 +82,52 @@ def plane_candidates(
         x, y, z = core.support((-ux, -uy, -uz))
         add(x, y, z, height + ux * x + uy * y + uz * z, 0)
     return up, found, size
+
+
+def fine_rim(a: PlacedSolid, plane: PlacedSolid, within: float) -> list[ContactCandidate]:
+    """Return further points of the lower rim of a cylinder that are at most `within` above a half-space,
+    beside the four of `plane_candidates`; none for other shapes."""
+    core = a.solid.core
+    if not isinstance(core, CylinderCore):
+        return []
+    up = plane.axes[2]
+    x, y, z = a.axes
+    cx, cy, cz = dot(x, up), dot(y, up), dot(z, up)
+    if math.hypot(cx, cy) >= abs(cz):
+        return []
+    found: list[ContactCandidate] = []
+    add = _adding_to(found, a.p, up, within)
+    height = dot(up, (a.p[0] - plane.p[0], a.p[1] - plane.p[1], a.p[2] - plane.p[2]))
+    end = 0 if cz > 0.0 else 1
+    s, first = core.half if end else -core.half, FIRST_FINE_RIM + end * FINE_RIM
+    for k, (c, d) in enumerate(_FINE_RIM):
+        if 4 * k % FINE_RIM:
+            p, q = core.rim_radius * c, core.rim_radius * d
+            add(
+                p * x[0] + q * y[0] + s * z[0],
+                p * x[1] + q * y[1] + s * z[1],
+                p * x[2] + q * y[2] + s * z[2],
+                height + p * cx + q * cy + s * cz,
+                first + k,
+            )
+    return found
+
+
+def _adding_to(found: list[ContactCandidate], origin: Vector3, up: Vector3, within: float) -> AddPoint:
+    """Return a function that adds a point of a shape at an offset from its origin, at a height above the
+    half-space."""
+    frame = frame_along(up)
+    (eu, ev, ew), (fu, fv, fw) = frame.u, frame.v
+    (px, py, pz), (ux, uy, uz) = origin, up
+
+    def add(x: float, y: float, z: float, above: float, part: int) -> None:
+        if above <= within:
+            on_a = px + x, py + y, pz + z
+            on_plane = on_a[0] - above * ux, on_a[1] - above * uy, on_a[2] - above * uz
+            u, v = eu * x + ev * y + ew * z, fu * x + fv * y + fw * z
+            found.append(ContactCandidate(u, v, above, on_a, on_plane, (part, GROUND)))
+
+    return add
 
 
 def _add_box(core: BoxCore, a: PlacedSolid, up: Vector3, height: float, add: AddPoint) -> None:
@@ -113,7 +160,7 @@ def _add_cylinder(core: CylinderCore, a: PlacedSolid, up: Vector3, height: float
         s = core.half if this_end else -core.half
         points: list[tuple[float, float, int]] = []
         if this_end == end and across < abs(cz):
-            # Four of the points, because a quarter of a turn apart they bear like all.
+            # Four of the points, because a quarter of a turn apart they bear most loads.
             step = RIM_POINTS // 4
             points = [
                 (r * c, r * d, this_end * RIM_POINTS + k) for k, (c, d) in enumerate(RIM) if k % step == 0

@@ -5,6 +5,9 @@ An *island* is a set of robots and bodies that contacts and constraints connect;
 friction where its coefficients are above zero. All rows act at the middle of the two points, so that forces
 on both bodies are opposite.
 
+**Points.** Of two faces with many vertices four contact points are chosen (`dynx.distance.contact_points`).
+Where a load leans beyond them, the step is solved again with the spare points that would overlap.
+
 **Gaps.** A contact whose gap phi may close in the step has the normal velocity w >= -phi / h: bodies touch at
 the end of the step, not beyond. Where they overlap, w >= 0. A displacement without velocity takes back a part
 of each overlap, and each error of a constraint (`dynx.rbd.constraints`).
@@ -42,6 +45,9 @@ from dynx.rbd.constraints import (
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, quat_from_rotation, quat_log, skew
 from dynx.steppers.layout import ConstraintLayout, Owner
+
+NEGLIGIBLE_CLOSING = 1e-10
+"""Speed [m/s] against a spare contact point up to which the others bear the load without it."""
 
 NEGLIGIBLE_REBOUND = 1e-9
 """Speed after an impact [m/s] that counts as none."""
@@ -223,9 +229,28 @@ class Island:
         if not closes and not self._constraints:
             for part in self.parts.values():
                 part.finish()
-            return [TouchImpulse(each, 0.0, np.zeros(3)) for each in self._contacts], {}
+            return [TouchImpulse(each, 0.0, np.zeros(3)) for each in self._contacts if not each.spare], {}
         for part in self.parts.values():
             part.release_dry_friction()
+        # Spares that bore a load in the step before are likely to do so again.
+        borne = [k for k, each in enumerate(self._contacts) if not each.spare or _bears(warm, each)]
+        return self._step_on(borne, self._contacts, rows, D, gaps, warm)
+
+    def _step_on(
+        self,
+        borne: Sequence[int],
+        every: Sequence[PossibleContact],
+        all_rows: Floats,
+        directions_of_all: Floats,
+        all_gaps: Floats,
+        warm: WarmStart,
+    ) -> tuple[list[TouchImpulse], WarmStart]:
+        """Take the step with impulses at some contacts of `every`, by number, and at each other one that
+        would close beyond its gap without."""
+        h, n = self._h, len(borne)
+        self._contacts = [every[k] for k in borne]
+        self._pairs = [each.pair for each in self._contacts]
+        rows, D, gaps = all_rows[borne], directions_of_all[borne], all_gaps[borne]
         free = self._velocity("free")
         present = np.array([_present(pair.friction) for pair in self._pairs], dtype=np.bool_).reshape(n, 6)
         limits, limit_gaps = self._limit_rows()
@@ -257,9 +282,15 @@ class Island:
         opening[list(sets.free)] = biases
         c = J @ free
         first = solve(sets, G, c + opening, numbers, start=start)
+        u = free + X @ first.impulses
+        if n < len(every):
+            short = all_rows[:, 0] @ u < -np.maximum(all_gaps, 0.0) / h - NEGLIGIBLE_CLOSING
+            short[borne] = False
+            if short.any():
+                more = sorted([*borne, *np.flatnonzero(short).tolist()])
+                return self._step_on(more, every, all_rows, directions_of_all, all_gaps, warm)
         last = self._impacts(sets, G, c, opening, numbers, first, normals, J)
         self.residual = float(max(first.residuals.largest, last.residuals.largest))
-        u = free + X @ first.impulses
         w = u if last is first else free + X @ last.impulses
         correction = self._correction(sets, G, first.velocities - opening, gaps, limit_gaps, errors, normals)
         displaced = u
@@ -401,6 +432,12 @@ class Island:
             for k, contact in enumerate(self._contacts)
         ]
         return touches, dict(zip(keys, values, strict=True))
+
+
+def _bears(warm: WarmStart, contact: PossibleContact) -> bool:
+    """Check whether a contact had a normal impulse in the step before."""
+    found = warm.get((CONTACT, contact.pair.a, contact.pair.b, *contact.feature))
+    return found is not None and bool(found[0] > 0.0)
 
 
 def _present(friction: tuple[float, float, float]) -> list[bool]:

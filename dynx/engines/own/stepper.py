@@ -276,7 +276,7 @@ class OwnStepper(Stepper):
             for part in self._moving:
                 part.forget_placements()
             found = self._finder.find(self._poses(), None)
-            touches = [TouchImpulse(each, 0.0, np.zeros(3)) for each in found]
+            touches = [TouchImpulse(each, 0.0, np.zeros(3)) for each in found if not each.spare]
         points, h = [], self.dt
         for contact, normal, friction in touches:
             if normal > 0.0 or contact.gap <= TOUCHING:

@@ -48,6 +48,9 @@ class PossibleContact(NamedTuple):
     normal: Floats
     """Unit vector (3,) from b to a."""
     gap: float
+    spare: bool = False
+    """True for a point that is needed only where the others do not bear the load
+    (`dynx.distance.ContactPoint`)."""
 
 
 class ContactFinder:
@@ -94,7 +97,7 @@ class ContactFinder:
                     moved.add(k)
                     self._solids[k].move(T[k])
             within = float(ways[a] + ways[b]) + MARGIN
-            points = contact_points(self._solids[a], self._solids[b], within)
+            points = contact_points(self._solids[a], self._solids[b], within, spares=True)
             if points:
                 pair = self._pairs.get((a, b)) or self._new_pair(a, b)
                 found += [
@@ -105,6 +108,7 @@ class ContactFinder:
                         np.array(each.point_b),
                         np.array(each.normal),
                         each.gap,
+                        each.spare,
                     )
                     for each in points
                 ]
