@@ -60,6 +60,17 @@ def size_of(*shapes: ConvexShape) -> float:
 # -- closed forms --
 
 
+def test_spares_are_the_points_beyond_the_limit() -> None:
+    rim = PlacedSolid(Cylinder(0.2, 0.1), pose((0, 0, 0.05)))
+    found = contact_points(rim, PlacedSolid(Plane()), 1e-3, spares=True)
+    assert found[:4] == contact_points(rim, PlacedSolid(Plane()), 1e-3)
+    assert [each.spare for each in found] == [False] * 4 + [True] * 12
+    angles = np.sort([np.arctan2(each.point_a[1], each.point_a[0]) for each in found])
+    assert np.diff(angles) == pytest.approx(np.pi / 8)
+    assert len({each.feature for each in found}) == 16
+
+
+
 @pytest.mark.parametrize("tilt", [0.0, 1e-12, 1e-9, -1e-9, 1e-4])
 @pytest.mark.parametrize("shape", [CUBE, CORNERS])
 @pytest.mark.parametrize("ground", [Plane(), BIG, Hull(CORNERS.points * [4.0, 4.0, 1.0])])
@@ -252,6 +263,18 @@ def check_on_surface(shape: ConvexShape, T: Floats, point: Floats, size: float) 
 
 
 @settings(max_examples=60)
+@given(near_pairs())
+def test_spares_follow_the_chosen_points_of_any_two_shapes(
+    pair: tuple[ConvexShape, Floats, ConvexShape, Floats],
+) -> None:
+    a, T_a, b, T_b = pair
+    chosen = points_of(a, T_a, b, T_b, 0.02)
+    found = contact_points(PlacedSolid(a, T_a), PlacedSolid(b, T_b), 0.02, spares=True)
+    assert found[: len(chosen)] == chosen
+    assert all(each.spare and each.gap <= 0.02 for each in found[len(chosen) :])
+    assert len(chosen) == 4 or len(found) == len(chosen)
+
+
 @given(near_pairs(), poses(3.0))
 def test_exchanged_shapes_and_a_rigid_motion(
     pair: tuple[ConvexShape, Floats, ConvexShape, Floats], T_world: Floats

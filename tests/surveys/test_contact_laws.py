@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from benchmarks.surveys.contact_laws import BARS, main, resting, slider
+from dynx.distance import PlacedSolid, contact_points
+from dynx.model.geometry import Plane
 
 
 def test_some_cases_keep_every_law(capsys: pytest.CaptureFixture[str]) -> None:
@@ -14,15 +18,23 @@ def test_some_cases_keep_every_law(capsys: pytest.CaptureFixture[str]) -> None:
     assert [line.split("  ")[0] for line in lines] == list(BARS)
 
 
-def test_no_body_that_slides_would_tip() -> None:
+def test_no_body_that_slides_would_tip(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
+    kinds = set()
     for _ in range(50):
-        body, friction, speed, _ = slider(rng)
-        lower = 2.0 * body.pose.matrix[2, 3]
-        shape = body.shapes[0].shape
-        width = min(shape.size[:2]) if hasattr(shape, "size") else 2.0 * getattr(shape, "radius", 0.0)
-        assert friction * lower < width
+        body, friction, speed, _, tipping = slider(rng, tmp_path)
+        assert friction < tipping
         assert np.linalg.norm(body.twist) == pytest.approx(speed)
+        # Friction tips no body whose centre, moved by mu times its height, stays above the base.
+        x, y, height = (body.pose.matrix @ np.append(body.inertial.origin.xyz, 1.0))[:3]
+        placed = PlacedSolid(body.shapes[0].shape, body.pose)
+        base = [each.point_b[:2] for each in contact_points(placed, PlacedSolid(Plane()), 1e-9, spares=True)]
+        for angle in np.linspace(0.0, 2.0 * np.pi, 7):
+            toward = np.array([np.cos(angle), np.sin(angle)])
+            reach = max(np.array(point) @ toward for point in base) - toward @ (x, y)
+            assert friction * height < reach
+        kinds.add(type(body.shapes[0].shape).__name__)
+    assert kinds == {"Box", "Cylinder", "Mesh"}
 
 
 def test_slopes_are_below_the_angle_of_friction() -> None:

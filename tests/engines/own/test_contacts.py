@@ -13,7 +13,7 @@ import pytest
 
 import dynx
 from dynx.engines.own.stepper import MAX_RESIDUAL, OwnStepper
-from dynx.model.geometry import Collision, HeightField
+from dynx.model.geometry import Collision, Cylinder, HeightField, Mesh
 from dynx.rbd.constraints import ConstraintSets, Residuals, Solution, solve
 from dynx.spatial.scalar import Floats
 from dynx.world import (
@@ -111,6 +111,42 @@ def test_a_sliding_plate_stops_where_coulombs_law_has_it(heading: float) -> None
     assert math.hypot(x, y) == pytest.approx(speed**2 / (2 * friction * G) - speed * h / 2, rel=1e-4)
     assert math.atan2(y, x) == pytest.approx(heading if heading < 3 else heading - 2 * math.pi, abs=1e-8)
     assert z == pytest.approx(0.05, abs=1e-9)
+
+
+def polygon(folder: Path, corners: int, height: float) -> Mesh:
+    """Return a prism about z above the plane z = 0, whose corners are at 0.1 m from the axis."""
+    angles = 2.0 * math.pi * np.arange(corners) / corners + 0.1
+    lines = [f"v {0.1 * math.cos(a)} {0.1 * math.sin(a)} {z}" for z in (0.0, height) for a in angles.tolist()]
+    lines += [f"f {k + 1} {k + 2} {corners + k + 1}" for k in range(corners)]
+    file = folder / "prism.obj"
+    file.write_text("\n".join(lines) + "\n")
+    return Mesh(str(file))
+
+
+@pytest.mark.parametrize("corners", [0, 6, 11])
+def test_a_load_near_the_edge_of_a_face_with_many_vertices_neither_tips_nor_turns_it(
+    corners: int, tmp_path: Path
+) -> None:
+    """Four points of a face do not bear the load of a body that slides with 0.95 of the friction at which it
+    tips; those of the edge that the load is near do."""
+    height = 0.2
+    cosine = math.cos(math.pi / corners) if corners else 1.0
+    rough = Material(friction=0.95 * cosine * 0.1 / (0.5 * height))
+    speed, heading, h = 0.8, 0.7, 2e-3
+    twist = (speed * math.cos(heading), speed * math.sin(heading), 0.0, 0.0, 0.0, 0.0)
+    shape = polygon(tmp_path, corners, height) if corners else Cylinder(0.1, height)
+    pose = dynx.Pose((0, 0, 0.0 if corners else 0.5 * height))
+    body = SceneBody("body", shape, pose, 2.0, twist=twist, material=rough)
+    with World(Scene("slide", bodies=(ground(material=rough), body)), "dynx", h) as world:
+        world.step(60)
+        T, twist_at_end = world.state.bodies["body"]
+        assert len(world.contacts("ground")) == 4
+    assert np.abs(twist_at_end).max() < 1e-9
+    assert T[:3, :3] == pytest.approx(np.eye(3), abs=1e-8)
+    assert math.atan2(T[1, 3], T[0, 3]) == pytest.approx(heading, abs=1e-8)
+    assert math.hypot(T[0, 3], T[1, 3]) == pytest.approx(
+        speed**2 / (2 * rough.friction * G) - speed * h / 2, rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
