@@ -70,7 +70,6 @@ def test_spares_are_the_points_beyond_the_limit() -> None:
     assert len({each.feature for each in found}) == 16
 
 
-
 @pytest.mark.parametrize("tilt", [0.0, 1e-12, 1e-9, -1e-9, 1e-4])
 @pytest.mark.parametrize("shape", [CUBE, CORNERS])
 @pytest.mark.parametrize("ground", [Plane(), BIG, Hull(CORNERS.points * [4.0, 4.0, 1.0])])

@@ -140,7 +140,6 @@ def test_a_load_near_the_edge_of_a_face_with_many_vertices_neither_tips_nor_turn
     with World(Scene("slide", bodies=(ground(material=rough), body)), "dynx", h) as world:
         world.step(60)
         T, twist_at_end = world.state.bodies["body"]
-        assert len(world.contacts("ground")) == 4
     assert np.abs(twist_at_end).max() < 1e-9
     assert T[:3, :3] == pytest.approx(np.eye(3), abs=1e-8)
     assert math.atan2(T[1, 3], T[0, 3]) == pytest.approx(heading, abs=1e-8)
