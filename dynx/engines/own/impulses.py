@@ -121,7 +121,9 @@ class Island:
         self._h, self._part_of = h, part_of
         self.parts = parts
         self._pairs = [each.pair for each in contacts]
-        self._contacts, self._constraints = contacts, constraints
+        self._constraints = constraints
+        self.contacts = contacts
+        """Points that may touch in the step, and later those at which impulses act."""
         self._poses, self._jacobians = poses, jacobians
         self._columns: dict[int, slice] = {}
         first = 0
@@ -139,7 +141,7 @@ class Island:
     def _contact_rows(self) -> tuple[Floats, Floats]:
         """Return J (n, 6, nv) of the contacts: normal, two tangents, and rotation about each of these; and
         these directions (n, 3, 3)."""
-        contacts = self._contacts
+        contacts = self.contacts
         points = np.array([0.5 * (each.point_a + each.point_b) for each in contacts])
         D = directions(np.array([each.normal for each in contacts]))
         J = np.zeros((len(contacts), 6, self._nv))
@@ -219,9 +221,9 @@ class Island:
 
         Where no contact closes or overlaps and nothing is constrained, each part completes its free motion.
         """
-        h, n = self._h, len(self._contacts)
+        h, n = self._h, len(self.contacts)
         rows, D = self._contact_rows() if n else (np.zeros((0, 6, self._nv)), np.zeros((0, 3, 3)))
-        gaps = np.array([each.gap for each in self._contacts])
+        gaps = np.array([each.gap for each in self.contacts])
         free = self._velocity("free")
         closes = bool((rows[:, 0] @ free < -np.maximum(gaps, 0.0) / h).any())
         # Overlaps are taken back even where nothing presses the parts together.
@@ -229,12 +231,12 @@ class Island:
         if not closes and not self._constraints:
             for part in self.parts.values():
                 part.finish()
-            return [TouchImpulse(each, 0.0, np.zeros(3)) for each in self._contacts if not each.spare], {}
+            return [TouchImpulse(each, 0.0, np.zeros(3)) for each in self.contacts if not each.spare], {}
         for part in self.parts.values():
             part.release_dry_friction()
         # Spares that bore a load in the step before are likely to do so again.
-        borne = [k for k, each in enumerate(self._contacts) if not each.spare or _bears(warm, each)]
-        return self._step_on(borne, self._contacts, rows, D, gaps, warm)
+        borne = [k for k, each in enumerate(self.contacts) if not each.spare or _bears(warm, each)]
+        return self._step_on(borne, self.contacts, rows, D, gaps, warm)
 
     def _step_on(
         self,
@@ -248,8 +250,8 @@ class Island:
         """Take the step with impulses at some contacts of `every`, by number, and at each other one that
         would close beyond its gap without."""
         h, n = self._h, len(borne)
-        self._contacts = [every[k] for k in borne]
-        self._pairs = [each.pair for each in self._contacts]
+        self.contacts = [every[k] for k in borne]
+        self._pairs = [each.pair for each in self.contacts]
         rows, D, gaps = all_rows[borne], directions_of_all[borne], all_gaps[borne]
         free = self._velocity("free")
         present = np.array([_present(pair.friction) for pair in self._pairs], dtype=np.bool_).reshape(n, 6)
@@ -384,7 +386,7 @@ class Island:
     # -- warm start ---------------------------------------------------------------------------
 
     def _keys(self, limits: Sequence[tuple[int, int, int]], dry: Sequence[tuple[int, int]]) -> list[Key]:
-        keys: list[Key] = [(CONTACT, each.pair.a, each.pair.b, *each.feature) for each in self._contacts]
+        keys: list[Key] = [(CONTACT, each.pair.a, each.pair.b, *each.feature) for each in self.contacts]
         keys += [(LIMIT, *each, 0) for each in limits]
         keys += [(DRY, *each, 0, 0) for each in dry]
         return keys + [(CONSTRAINT, number, 0, 0, 0) for number in self._constraints]
@@ -429,7 +431,7 @@ class Island:
             row += size
         touches = [
             TouchImpulse(contact, float(values[k, 0]), values[k, 1:4])
-            for k, contact in enumerate(self._contacts)
+            for k, contact in enumerate(self.contacts)
         ]
         return touches, dict(zip(keys, values, strict=True))
 
