@@ -1,0 +1,1 @@
+"""The backend `reference`: the algorithms of `dynx.rbd`, evaluated in float64."""
