@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from dynx.model.mechanism import ROOT
+from dynx.same.scales import Whole
 from dynx.same.skeleton import Skeleton
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
@@ -69,9 +70,8 @@ def _features(skeleton: Skeleton, order: list[int], grouped: bool) -> _Features:
             found.places[key, "centre"] = T[:3, 3], np.eye(3)
             if key == 0:
                 _add_way(found, key, inertia.first_moment, skeleton.whole.mass * skeleton.reach)
-                for number, axis in _principal_axes(
-                    RigidInertia(np.ones(()), np.zeros(3), inertia.rotational_inertia)
-                ):
+                about_center = RigidInertia(np.zeros(()), np.zeros(3), inertia.rotational_inertia)
+                for number, axis in _principal_axes(about_center, skeleton.whole):
                     found.principal[key, number] = axis
             continue
         if kind is not None and key > 0:
@@ -86,17 +86,20 @@ def _features(skeleton: Skeleton, order: list[int], grouped: bool) -> _Features:
         elif mass > 0.0:
             found.places[key, "centre"] = T[:3, :3] @ (inertia.first_moment / mass) + T[:3, 3], np.eye(3)
         if kind is None or not grouped:
-            for number, axis in _principal_axes(inertia):
+            for number, axis in _principal_axes(inertia, skeleton.whole):
                 found.principal[key, number] = T[:3, :3] @ axis
     _add_offsets(found, skeleton.reach)
     return found
 
 
-def _principal_axes(inertia: RigidInertia) -> Iterator[tuple[int, Floats]]:
-    """Yield the principal axes (3,) that no other one can be exchanged for, numbered by their moments."""
+def _principal_axes(inertia: RigidInertia, whole: Whole) -> Iterator[tuple[int, Floats]]:
+    """Yield the principal axes (3,) that no other one can be exchanged for, numbered by their moments; none
+    of a tensor that is rounding beside the whole robot."""
     mass, H = float(inertia.mass), skew(inertia.first_moment)
     moments, axes = np.linalg.eigh(inertia.rotational_inertia + (H @ H / mass if mass else 0.0))
     scale = float(np.max(np.abs(moments)))
+    if scale <= PARALLEL * whole.mass * whole.length**2:
+        return
     for number in range(3):
         others = np.delete(moments, number)
         if float(np.min(np.abs(others - moments[number]))) > ISOLATED * scale:

@@ -11,7 +11,7 @@ from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, JointType, Link, Pose
 from dynx.same import same_robot
 from tests.same.planted import other_mass, with_inertial
-from tests.same.rewrites import with_moved_frames, with_other_names
+from tests.same.rewrites import with_moved_frames, with_other_names, with_other_order
 from tests.same.test_same_robot import random_body
 
 POINT = Inertial(1.0, Pose((0.25, 0.2, 0.3)))
@@ -25,6 +25,7 @@ CASES: dict[str, list[Part]] = {
     "hinge on a slide": [(0, "prismatic", None), (1, "continuous", None)],
     "two hinges on a slide": [(0, "prismatic", None), (1, "continuous", None), (1, "revolute", None)],
     "point mass on a slide": [(0, "prismatic", POINT)],
+    "point mass on two slides": [(0, "prismatic", None), (1, "prismatic", POINT)],
     "body on a slide": [(0, "prismatic", BODY)],
     "body on two slides": [(0, "prismatic", None), (1, "prismatic", BODY)],
     "hinge beside two slides": [(0, "continuous", None), (0, "prismatic", None), (2, "prismatic", None)],
@@ -59,6 +60,23 @@ def test_frames_of_a_robot_without_a_heavy_base_may_be_moved(case: str) -> None:
             report = same_robot(model, other)
             assert report.same, (seed, report.differences)
             assert all(each.sign == 1 for each in report.coordinates)
+
+
+LIKE: dict[str, list[Part]] = {
+    "hinges": [(0, "revolute", None)] * 3,
+    "slides": [(0, "prismatic", POINT)] * 3,
+    "hinges of bodies": [(0, "continuous", BODY)] * 4,
+    "hinges on a slide": [(0, "prismatic", None), *[(1, "revolute", POINT)] * 3],
+}
+
+
+@pytest.mark.parametrize("case", LIKE)
+def test_several_like_joints_of_one_body_may_have_other_names_and_another_order(case: str) -> None:
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        model = robot(LIKE[case], rng)
+        other = with_moved_frames(with_other_order(with_other_names(model), rng), rng)
+        assert same_robot(model, other).same, seed
 
 
 def test_axes_that_are_nearly_parallel_determine_the_frame() -> None:
