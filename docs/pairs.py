@@ -18,53 +18,58 @@ PAGE = Path(__file__).with_name("pairs.md")
 
 HEAD = """# Public robots in two formats: is it the same robot?
 
-Some public repositories describe a robot in more than one format. This page states for each such pair of
-files whether both describe the same robot. `python -m docs.pairs` writes the page from the results of a
-survey, which runs [`dynx same`](same.md) on each pair.
+Some public repositories describe a robot in more than one format. A *pair* is a URDF file, and an MJCF or
+SDF file. This page states for each pair whether both files describe the same robot. A survey runs
+[`dynx same`](same.md) on each pair, and `python -m docs.pairs` writes the results on this page.
 
-A *pair* is a URDF file and an MJCF or SDF file. The URDF file may be from the same repository, from
-another repository, or from the package example-robot-data. A program chose the pairs by three rules:
+The URDF file may be from the same repository, from another repository, or from the package
+example-robot-data. A program chose the pairs by three rules:
 
 - The two files share a word in their paths or robot names.
-- The two files share at least half of their joint names. Files of one repository may instead have equal
-  numbers of joints.
+- The two files share at least half of their joint names. If the files are from one repository, equal numbers
+  of joints are enough.
 - For one URDF file the program takes at most {most} MJCF files and {most} SDF files of a repository.
 
 The list of pairs is `benchmarks/surveys/robot_pairs.tsv`, with repository, commit, path and SHA-256 of each
 file.
 
-How to read the tables:
+## How to read the tables
 
-- **The tolerance is {tolerance:g}**, because the numbers in many files have four or five digits.
-- **A verdict is about rigid-body dynamics.** Limits, damping, armature, actuators and shapes do not
-  affect the verdict.
-- **Different does not mean wrong.** Two files often describe two versions of a robot, or one file has a
-  hand, a sensor or a fixed joint that the other file lacks.
-- **`URDF file`** has a path without a repository if both files are in one repository.
-- **`elements`** is the number of elements of the files that differ. **`joints without counterpart`** is
-  the number of joints that only one file has. Joints behind such a joint are not counted.
-- **`largest difference`** begins with the [size](same.md#what-the-report-contains) of the largest
-  difference, relative to a scale of the robot. Then it names the element in the MJCF or SDF file. In "2 kg
-  instead of 3 kg", the MJCF or SDF file has 2 kg, and needs 3 kg to agree with the URDF file.
-- **`merged body`** means that fixed joints connect the named link to other links, and that the sum of their
-  inertials differs. `without` names other links in the MJCF or SDF file that have mass. The first number is
-  the value of the named link alone. With the second number the sum agrees with the URDF file, while the
-  other links keep their inertials. A mass after "instead of" can therefore be negative.
-- **`engines`** has the result of an independent check. Pinocchio loads the URDF file, MuJoCo the MJCF
-  file, and Drake the SDF file, all without dynx. The column has the largest relative difference of total
-  mass and joint-space inertia between the two engines. The check uses the joints that have a counterpart.
-  The column has `-` if an engine or dynx refuses a file, or if no joint has a counterpart.
+- **Tolerance.** The tolerance is {tolerance:g}, because the numbers in many files have four or five digits.
+- **Verdict.** The verdict is about rigid-body dynamics. Limits, damping, armature, actuators and shapes do
+  not affect the verdict.
+- **Different does not mean wrong.** Two files often describe two versions of a robot. Or one file has a hand,
+  a sensor or a fixed joint that the other file lacks.
+- **URDF file.** A path without a repository is in the repository of the MJCF or SDF file.
+- **Elements.** The number of elements of the MJCF or SDF file that differ.
+- **Joints without counterpart.** The number of joints that only one file has. Joints behind such a joint are
+  not counted.
+- **Engines.** Two engines load the files without dynx: Pinocchio the URDF file, and MuJoCo the MJCF file or
+  Drake the SDF file. The column has the largest relative difference of total mass and joint-space inertia
+  between the two engines. For the inertia, the survey uses the joints that have a counterpart. `-` means that
+  an engine refuses a file, or that no joint has a counterpart.
 
-The survey also checks each report of `dynx same`:
+The column **largest difference** describes the element with the largest difference, for example:
+
+| in the table | meaning |
+|---|---|
+| `0.026: link torso, inertial` | the [size](same.md#what-the-report-contains) of the difference, and the element of the MJCF or SDF file |
+| `mass 2 kg instead of 3 kg` | the MJCF or SDF file has 2 kg. With 3 kg it would agree with the URDF file |
+| `merged body: mass 2 kg instead of 3 kg` | fixed joints connect the link to others, and these links form one merged body. The total inertia of the merged body differs |
+| `merged body without wrist: mass 2 kg instead of -1 kg` | the link `wrist` of the same merged body also has mass, which is not in the 2 kg. If `wrist` keeps its mass, this link needs -1 kg |
+
+## How the survey checks dynx
 
 - If the report says "same", and the two engines differ by more than ten times the tolerance, a difference
   is *missed*.
-- If the report says "different", and each joint has a counterpart, the survey repairs the MJCF or SDF file:
-  it replaces all elements that the report names. If the engines still differ by more than ten times the
-  tolerance, a difference is *missed*, too. If MuJoCo or Drake refuses the file, Pinocchio loads the repaired
-  robot instead.
-- The survey then reinserts each original element alone into the repaired robot. If an element changes
-  neither the mass nor the joint-space inertia in Pinocchio, the report named the element wrongly.
+- If the report says "different" and each joint has a counterpart, the survey repairs the MJCF or SDF file. It
+  replaces all elements that the report names. If the engines still differ by more than ten times the
+  tolerance, a difference is *missed*. If MuJoCo or Drake refuses the file, Pinocchio loads the repaired robot
+  instead.
+- The survey also puts each original element alone back into the repaired robot. The mass or the joint-space
+  inertia in Pinocchio must then change. Otherwise the report named the element wrongly.
+
+A report counts as checked if engines could compare the pair itself or the repaired file.
 
 The development of `dynx same` used {develop} of the {count} pairs, chosen by a hash. The other pairs were
 compared twice. Between the two comparisons, a fault in the list of differences that `dynx same` prints was
