@@ -53,10 +53,13 @@ The column **largest difference** describes the element with the largest differe
 
 | in the table | meaning |
 |---|---|
-| `0.026: link torso, inertial` | the [size](same.md#what-the-report-contains) of the difference, and the element of the MJCF or SDF file |
+| `0.026: link torso, inertial` | the [size](same.md#what-the-report-contains) of the difference, and the \
+element of the MJCF or SDF file |
 | `mass 2 kg instead of 3 kg` | the MJCF or SDF file has 2 kg. With 3 kg it would agree with the URDF file |
-| `merged body: mass 2 kg instead of 3 kg` | fixed joints connect the link to others, and these links form one merged body. The total inertia of the merged body differs |
-| `merged body without wrist: mass 2 kg instead of -1 kg` | the link `wrist` of the same merged body also has mass, which is not in the 2 kg. If `wrist` keeps its mass, this link needs -1 kg |
+| `merged body: mass 2 kg instead of 3 kg` | fixed joints connect the link to others, and these links form \
+one merged body. The total inertia of the merged body differs |
+| `merged body without wrist: mass 2 kg instead of -1 kg` | the link `wrist` of the same merged body also \
+has mass, which is not in the 2 kg. If `wrist` keeps its mass, this link needs -1 kg |
 
 ## How the survey checks dynx
 
