@@ -344,12 +344,13 @@ def solve(
     floors: Floats | None = None,
     start: Floats | None = None,
     tolerance: float = TOLERANCE,
+    attempts: Sequence[Attempt] = ATTEMPTS,
 ) -> Solution:
     """Return the impulses of a step on floats, from a warm start (m,) or zero.
 
     Newton's method begins at the start; where it does not converge in a few steps, sweeps improve the start,
-    and it begins again. The residuals tell how well the best attempt did. Results depend on the arguments
-    alone.
+    and it begins again, at most once for each of the `attempts`, each with at most `NEWTON_STEPS`. The
+    residuals tell how well the best attempt did. Results depend on the arguments alone.
     """
     floors = np.zeros(sets.size) if floors is None else floors
     at: Floats = np.zeros(sets.size) if start is None else start
@@ -357,7 +358,7 @@ def solve(
     newton = _Newton(sets, G, c, np.array(numbers, dtype=np.float64), limits, floors)
     rounding = ROUNDING * np.abs(G)
     best, least, taken = at, math.inf, 0
-    for attempt in ATTEMPTS:
+    for attempt in attempts:
         w: Floats = c + G @ at
         for _ in range(attempt.sweeps):
             at, w, _ = sweep(sets, G, numbers, limits, floors, at, w)

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from dynx.engines.own.parts import OwnRobot
 from dynx.engines.own.touching import MARGIN, REACH, PossibleContact
 from dynx.rbd.constraints import (
+    ATTEMPTS,
     MAX_CORRECTION_SPEED,
     NEGLIGIBLE,
     TOLERANCE,
@@ -297,8 +298,7 @@ class Island:
         correction = self._correction(sets, G, first.velocities - opening, gaps, limit_gaps, errors, normals)
         displaced = u
         if correction is not None:
-            self.displacement_residual = float(correction.residuals.largest)
-            displaced = u + X @ correction.impulses
+            displaced = u + X @ correction
         for number, part in self.parts.items():
             columns = self._columns[number]
             part.finish_at(displaced[columns], self._at_rest(number, w[columns], dry, sets, last, numbers))
@@ -345,9 +345,9 @@ class Island:
         limit_gaps: Floats,
         errors: Floats,
         normals: NDArray[np.intp],
-    ) -> Solution | None:
-        """Return the impulses of the displacement that takes back a part of overlaps and errors of
-        constraints; None where there are none."""
+    ) -> Floats | None:
+        """Return the impulses (m,) of the displacement that takes back a part of overlaps and errors of
+        constraints, and keep its residual; None where there are none."""
         h = self._h
         overlaps = bool((gaps < -NEGLIGIBLE).any())
         if not overlaps and not (np.abs(errors) > NEGLIGIBLE).any():
@@ -358,8 +358,18 @@ class Island:
         rows = list(sets.unilateral[len(normals) :])
         wanted[rows] = np.maximum(limit_gaps / h + velocities[rows], 0.0)
         wanted[list(sets.free)] = np.clip(errors / h, -MAX_CORRECTION_SPEED, MAX_CORRECTION_SPEED)
+        # Without friction its rows have no impulses, and most of the problem is gone.
+        part = [*sets.unilateral, *sets.free]
+        count = len(sets.unilateral)
+        smaller = ConstraintSets(len(part), tuple(range(count)), free=tuple(range(count, len(part))))
         tolerance = max(TOLERANCE, 0.1 * NEGLIGIBLE / h)
-        return solve(sets, G, wanted, np.zeros(len(sets.disks)), tolerance=tolerance)
+        found = solve(
+            smaller, G[np.ix_(part, part)], wanted[part], NO_ROWS, tolerance=tolerance, attempts=ATTEMPTS[:3]
+        )
+        self.displacement_residual = float(found.residuals.largest)
+        impulses = np.zeros(sets.size)
+        impulses[part] = found.impulses
+        return impulses
 
     def _at_rest(
         self,
