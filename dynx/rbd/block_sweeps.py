@@ -1,10 +1,10 @@
 """Sweeps over contacts and joints on the factors of a tree, without a Delassus matrix, for any scalar.
 
 A *block* is a contact, with a normal row and two tangents, or a joint, with the row of its coordinate. Its
-velocity is w = c + Y u, and its impulses x change u by Z' x (`dynx.rbd.eliminated_rows`). A visit solves the
-block for given others and changes u. Entries of u that no other block has are not kept: they are a product
-with the block's own impulses. So a visit takes operations for the joints that two blocks have in common,
-and rows of many blocks take far fewer than the Delassus matrix of all.
+velocity is w = c + Y u, and its impulses x change u by D^-1 Y' x (`dynx.rbd.eliminated_rows`). A visit solves
+the block for given others and changes u. Entries of u that no other block has are not kept: they are a
+product with the block's own impulses. So a visit takes operations for the joints that two blocks have in
+common, and rows of many blocks take far fewer than the Delassus matrix of all.
 
 The laws are those of `dynx.rbd.constraints`. A joint with dry friction r and stops may have the velocities
 low <= w <= high in the step, where low <= 0 <= high. Its impulse is at most r against the motion between
@@ -55,7 +55,8 @@ class Block:
     rows: list[int]
     Y: list[Velocities]
     """Entries of the rows that other blocks have too."""
-    Z: list[Velocities]
+    pivots: Velocities
+    """1 / D of these entries. A product Y D^-1 for each row would take as much memory as Y."""
     own: list[Vector]
     """Part of the block of the Delassus matrix from entries that no other block has."""
     G: list[Vector]
@@ -66,18 +67,19 @@ class Block:
     """1 / scales; 0 where nothing can move."""
 
 
-def blocks_of(eliminated: EliminatedRows, contacts: int, joints: int) -> list[Block]:
-    """Return the blocks of rows: 3 for each contact, then one for each joint."""
+def blocks_of(eliminated: EliminatedRows, pivots: Sequence[Any], contacts: int, joints: int) -> list[Block]:
+    """Return the blocks of rows: 3 for each contact, then one for each joint. `pivots` are 1 / D."""
     rows = [[3 * k, 3 * k + 1, 3 * k + 2] for k in range(contacts)]
     rows += [[3 * contacts + k] for k in range(joints)]
     count: dict[int, int] = {}
     for each in rows:
         for place in {place for row in each for place in eliminated.Y[row]}:
             count[place] = count.get(place, 0) + 1
-    return [_block(eliminated, each, {place for place, n in count.items() if n > 1}) for each in rows]
+    shared = {place for place, n in count.items() if n > 1}
+    return [_block(eliminated, pivots, each, shared) for each in rows]
 
 
-def _block(eliminated: EliminatedRows, rows: list[int], shared: set[int]) -> Block:
+def _block(eliminated: EliminatedRows, pivots: Sequence[Any], rows: list[int], shared: set[int]) -> Block:
     def shared_part(row: Velocities) -> Velocities:
         return {place: entry for place, entry in row.items() if place in shared}
 
@@ -100,22 +102,27 @@ def _block(eliminated: EliminatedRows, rows: list[int], shared: set[int]) -> Blo
     if len(rows) == 3:
         scales.append(largest_eigenvalue(G[1][1], G[2][2], G[1][2]))
     inverse = [select(less(IMMOVABLE, each), 1.0 / (each + TINY), 0.0) for each in scales]
-    Y, Z = ([shared_part(each[row]) for row in rows] for each in (eliminated.Y, eliminated.Z))
-    return Block(rows, Y, Z, own, G, scales, inverse)
+    Y = [shared_part(eliminated.Y[row]) for row in rows]
+    places = {place for row in Y for place in row}
+    return Block(rows, Y, {place: pivots[place] for place in places}, own, G, scales, inverse)
 
 
 def impulse_velocities(blocks: Sequence[Block], x: Vector) -> Velocities:
     """Return the entries of u that blocks have in common, for impulses x (m,)."""
     u: Velocities = {}
     for block in blocks:
-        _add(u, block.Z, [x[row] for row in block.rows])
+        _add(u, block, [x[row] for row in block.rows])
     return u
 
 
-def _add(u: Velocities, Z: Sequence[Velocities], steps: Sequence[Any]) -> None:
-    for row, step in zip(Z, steps, strict=True):
+def _add(u: Velocities, block: Block, steps: Sequence[Any]) -> None:
+    """Add the effect of impulses on the first rows of a block to u."""
+    pushed: Velocities = {}
+    for row, step in zip(block.Y, steps, strict=False):
         for place, entry in row.items():
-            u[place] = u.get(place, 0.0) + entry * step
+            pushed[place] = pushed[place] + entry * step if place in pushed else entry * step
+    for place, each in pushed.items():
+        u[place] = u.get(place, 0.0) + block.pivots[place] * each
 
 
 def block_velocity(block: Block, c: Vector, u: Velocities, x: Vector) -> Vector:
@@ -155,7 +162,7 @@ def block_sweep(
         else:
             new = [_joint_impulse(block, bounds[number - len(friction)], held[0], w[0])]
         steps = [a - b for a, b in zip(new, held, strict=True)]
-        _add(u, block.Z, steps)
+        _add(u, block, steps)
         for place, (row, step) in enumerate(zip(block.rows, steps, strict=True)):
             x[row] = new[place]
             change = maximum(change, abs(step) * block.scales[min(place, 1)])
@@ -261,7 +268,7 @@ def displacement_sweep(
             free = w - block.scales[0] * y[number]
             new = (minimum(maximum(free, least), most) - free) * block.inverse[0]
         step = new - y[number]
-        _add(u, block.Z[:1], [step])
+        _add(u, block, [step])
         y[number] = new
         change = maximum(change, abs(step) * block.scales[0])
     return u, y, change
@@ -274,13 +281,18 @@ def _first_velocity(block: Block, u: Velocities, y: Any) -> Any:
     return w
 
 
-def all_velocities(eliminated: EliminatedRows, rows: Sequence[int], x: Sequence[Any], size: int) -> Vector:
-    """Return u (size,) of impulses x on some rows; 0 where they have no entry."""
-    u: Vector = [0.0] * size
+def all_velocities(
+    eliminated: EliminatedRows, pivots: Sequence[Any], rows: Sequence[int], x: Sequence[Any]
+) -> Vector:
+    """Return u (nv,) of impulses x on some rows; 0 where they have no entry."""
+    pushed: Vector = [0.0] * len(pivots)
     for row, impulse in zip(rows, x, strict=True):
-        for place, entry in eliminated.Z[row].items():
-            u[place] = u[place] + entry * impulse
-    return u
+        for place, entry in eliminated.Y[row].items():
+            pushed[place] = pushed[place] + entry * impulse
+    return [
+        each if isinstance(each, float) and each == 0.0 else each * pivot
+        for each, pivot in zip(pushed, pivots, strict=True)
+    ]
 
 
 def as_objects(numbers: Sequence[Any]) -> Array:

@@ -23,7 +23,7 @@ joints between the base and the body that touches, and sweeps need no Delassus m
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,7 +42,7 @@ from dynx.rbd.block_sweeps import (
     displacement_sweep,
     impulse_velocities,
 )
-from dynx.rbd.constraints import NEGLIGIBLE, displacement_velocity, opening_velocity
+from dynx.rbd.constraints import NEGLIGIBLE, TINY, displacement_velocity, opening_velocity
 from dynx.rbd.contact_geometry import plane_point_count, plane_points
 from dynx.rbd.crba import mass_matrix
 from dynx.rbd.displacement import floating_displacement, floating_end_velocity
@@ -59,6 +59,10 @@ from dynx.rbd.placement import Placement
 from dynx.rbd.rnea import bias_torque
 from dynx.spatial.scalar import Array, Floats, less, maximum, minimum, select
 from dynx.spatial.so3 import cross, rotate, rotation_from_quat
+
+MAX_ACCELERATION = 16.0
+"""Number of steps of sweeps that acceleration takes at most at once. Along impulses that change no velocity,
+as redundant contacts have, steps are rounding and their quotients arbitrary."""
 
 DISPLACEMENT_SWEEPS = 4
 """Number of sweeps for the displacement between two tests."""
@@ -104,6 +108,11 @@ class ShapesOnPlane:
     def counts(self) -> list[int]:
         """Number of contact points of each shape."""
         return [plane_point_count(each.shape, deepest=each.deepest) for each in self.shapes]
+
+    def has_redundant_points(self, mechanism: Mechanism) -> bool:
+        """Check whether a body has several contact points."""
+        bodies = [mechanism.frames[each.frame].body for each in self.shapes]
+        return len(set(bodies)) < sum(self.counts)
 
     @property
     def friction(self) -> list[Any]:
@@ -174,6 +183,10 @@ class Sweeps:
     where contacts bear a robot on separate feet."""
     most: int = 60
     """Largest number of sweeps."""
+    accelerated: bool | None = None
+    """True if each sweep begins at a point that the last two determine by the secant method (Anderson,
+    Iterative procedures for nonlinear integral equations, 1965). Points of one body need it, such as those of
+    a sole: their rows are redundant, and sweeps alone converge slowly. None: where a body has several."""
 
 
 def repeat_numbers(step: Callable[[Numbers], Numbers], state: Numbers, most: int) -> Numbers:
@@ -238,7 +251,8 @@ def contact_step(
     L, D = factors(stiffness)
     rest = eliminate_tips(L, np.concatenate([others[:base], motors + others[base:]]))
     # The velocity at the end is v + L^-T u.
-    u = [h * each / pivot for each, pivot in zip(rest, D, strict=True)]
+    pivots = [1.0 / pivot for pivot in D]
+    u = [h * each * pivot for each, pivot in zip(rest, pivots, strict=True)]
     contacts = len(gaps)
     rows += joint_rows
     eliminated = eliminate_rows(L, D, rows)
@@ -251,13 +265,15 @@ def contact_step(
     opening = [opening_velocity(gap, h) for gap in gaps]
     for k, each in enumerate(opening):
         c[3 * k] = c[3 * k] + each
-    blocks = blocks_of(eliminated, contacts, len(limited))
+    if sweeps.accelerated is None:
+        sweeps = replace(sweeps, accelerated=touching.has_redundant_points(mechanism))
+    blocks = blocks_of(eliminated, pivots, contacts, len(limited))
     bounds = [_bounds(joints, k, positions[k], h) for k in limited]
     solved, w = _solved_impulses(blocks, sweeps, c, touching.friction, bounds, impulses, repeat)
     for k, each in enumerate(opening):
         w[k] = w[k] - each
-    extra = _displacement(blocks, sweeps, L, eliminated, gaps, bounds, w, h, repeat)
-    changes = all_velocities(eliminated, range(len(rows)), list(solved["impulses"]), len(L))
+    extra = _displacement(blocks, sweeps, L, pivots, eliminated, gaps, bounds, w, h, repeat)
+    changes = all_velocities(eliminated, pivots, range(len(rows)), list(solved["impulses"]))
     end = moved + substitute_back(L, [a + b for a, b in zip(u, changes, strict=True)])
     if mechanism.floating:
         q, v = floating_displacement(q, end + extra, end, h, mechanism.root_center)
@@ -371,34 +387,51 @@ def _solved_impulses(
     and the velocity of each block's first row."""
     start = impulse_velocities(blocks, list(impulses))
     places = sorted(start)
+    accelerated = sweeps.accelerated
+    weights = [block.scales[min(k, 1)] for block in blocks for k in range(len(block.rows))]
 
     def next_state(state: Numbers) -> Numbers:
-        x, u = list(state["impulses"]), dict(zip(places, state["shared"], strict=True))
-        u, x, change = block_sweep(blocks, c, friction, bounds, u, x)
-        goes_on = less(sweeps.tolerance, change)
-        return {
-            "impulses": as_objects(x),
-            "shared": as_objects([u[k] for k in places]),
-            "goes_on": as_objects([goes_on]),
-        }
+        names = ("point", "of_point") if accelerated else ("impulses", "shared")
+        point, of_point = (list(state[name]) for name in names)
+        u, x, change = block_sweep(
+            blocks, c, friction, bounds, dict(zip(places, of_point, strict=True)), point
+        )
+        shared = [u[k] for k in places]
+        found = {"impulses": x, "shared": shared, "goes_on": [less(sweeps.tolerance, change)]}
+        if accelerated:
+            step = [a - b for a, b in zip(x, point, strict=True)]
+            size = _product(weights, step, step)
+            turned = [a - b for a, b in zip(step, state["step"], strict=True)]
+            share = _product(weights, turned, step) / (_product(weights, turned, turned) + TINY)
+            share = minimum(maximum(share, -MAX_ACCELERATION), MAX_ACCELERATION)
+            # Where steps grow, the sweeps alone go on.
+            share = select(less(state["size"][0], size), 0.0, share)
+            found |= {"step": step, "size": [size]}
+            found["point"] = [a - share * (a - b) for a, b in zip(x, state["impulses"], strict=True)]
+            found["of_point"] = [a - share * (a - b) for a, b in zip(shared, state["shared"], strict=True)]
+        return {name: as_objects(values) for name, values in found.items()}
 
-    first = {
-        "impulses": impulses,
-        "shared": as_objects([start[k] for k in places]),
-        "goes_on": as_objects([1.0]),
-    }
-    state = repeat(next_state, first, sweeps.most)
-    shared: Velocities = dict(zip(places, state["shared"], strict=True))
-    x = list(state["impulses"])
-    residual, w = block_residual(blocks, c, friction, bounds, shared, x)
+    x, shared = list(impulses), [start[k] for k in places]
+    first = {"impulses": x, "shared": shared, "goes_on": [1.0]}
+    if accelerated:
+        first |= {"point": x, "of_point": shared, "step": [0.0] * len(x), "size": [0.0]}
+    state = repeat(next_state, {name: as_objects(values) for name, values in first.items()}, sweeps.most)
+    u: Velocities = dict(zip(places, state["shared"], strict=True))
+    residual, w = block_residual(blocks, c, friction, bounds, u, list(state["impulses"]))
     found = {"impulses": state["impulses"], "residual": as_objects([residual])}
     return found, [each[0] for each in w]
+
+
+def _product(weights: Sequence[Any], a: Sequence[Any], b: Sequence[Any]) -> Any:
+    terms = [weight * x * y for weight, x, y in zip(weights, a, b, strict=True)]
+    return sum(terms[1:], terms[0])
 
 
 def _displacement(
     blocks: Sequence[Block],
     sweeps: Sweeps,
     L: list[dict[int, Array]],
+    pivots: Sequence[Any],
     eliminated: EliminatedRows,
     gaps: Sequence[Any],
     bounds: Sequence[JointBounds],
@@ -418,7 +451,7 @@ def _displacement(
     deepest: Any = 0.0
     for gap in gaps:
         deepest = maximum(deepest, -gap)
-    places = sorted({place for block in blocks for place in block.Z[0]})
+    places = sorted({place for block in blocks for place in block.Y[0]})
     rows = [block.rows[0] for block in blocks]
 
     def next_state(state: Numbers) -> Numbers:
@@ -426,7 +459,7 @@ def _displacement(
         change: Any = 0.0
         for _ in range(DISPLACEMENT_SWEEPS):
             u, y, change = displacement_sweep(blocks, wanted, ranges, u, y)
-        entries = all_velocities(eliminated, rows, y, len(L))
+        entries = all_velocities(eliminated, pivots, rows, y)
         return {
             "impulses": as_objects(y),
             "shared": as_objects([u[k] for k in places]),
@@ -438,6 +471,6 @@ def _displacement(
         "impulses": as_objects([0.0] * len(blocks)),
         "shared": as_objects([0.0] * len(places)),
         "velocity": as_objects([0.0] * len(L)),
-        "goes_on": as_objects([less(NEGLIGIBLE, deepest)]),
+        "goes_on": as_objects([less(max(NEGLIGIBLE, h * sweeps.tolerance), deepest)]),
     }
     return repeat(next_state, first, -(-sweeps.most // DISPLACEMENT_SWEEPS))["velocity"]
