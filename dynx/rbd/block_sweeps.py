@@ -53,6 +53,8 @@ class Block:
     """Rows of a contact (3) or of a joint (1)."""
 
     rows: list[int]
+    places: set[int]
+    """Places of all entries of the rows."""
     Y: list[Velocities]
     """Entries of the rows that other blocks have too."""
     pivots: Velocities
@@ -104,7 +106,8 @@ def _block(eliminated: EliminatedRows, pivots: Sequence[Any], rows: list[int], s
     inverse = [select(less(IMMOVABLE, each), 1.0 / (each + TINY), 0.0) for each in scales]
     Y = [shared_part(eliminated.Y[row]) for row in rows]
     places = {place for row in Y for place in row}
-    return Block(rows, Y, {place: pivots[place] for place in places}, own, G, scales, inverse)
+    support = {place for row in rows for place in eliminated.Y[row]}
+    return Block(rows, support, Y, {place: pivots[place] for place in places}, own, G, scales, inverse)
 
 
 def impulse_velocities(blocks: Sequence[Block], x: Vector) -> Velocities:
@@ -130,12 +133,16 @@ def block_velocity(block: Block, c: Vector, u: Velocities, x: Vector) -> Vector:
     them."""
     found = []
     for row, entries, own in zip(block.rows, block.Y, block.own, strict=True):
-        w = c[row]
-        for place, entry in entries.items():
-            w = w + entry * u[place]
+        # Two sums, of which each waits for half of the additions.
+        first, second = c[row], 0.0
         for other, entry in zip(block.rows, own, strict=True):
-            w = w + entry * x[other]
-        found.append(w)
+            first = first + entry * x[other]
+        for number, (place, entry) in enumerate(entries.items()):
+            if number % 2:
+                first = first + entry * u[place]
+            else:
+                second = second + entry * u[place]
+        found.append(first + second)
     return found
 
 
@@ -154,19 +161,46 @@ def block_sweep(
     """
     u, x = dict(u), list(x)
     change: Any = 0.0
-    for number, block in enumerate(blocks):
-        w = block_velocity(block, c, u, x)
-        held = [x[row] for row in block.rows]
-        if len(held) == 3:
-            new = _contact_impulses(block, friction[number], held, w)
-        else:
-            new = [_joint_impulse(block, bounds[number - len(friction)], held[0], w[0])]
-        steps = [a - b for a, b in zip(new, held, strict=True)]
-        _add(u, block, steps)
-        for place, (row, step) in enumerate(zip(block.rows, steps, strict=True)):
-            x[row] = new[place]
-            change = maximum(change, abs(step) * block.scales[min(place, 1)])
+    for group in visits(blocks):
+        done: list[Vector] = []
+        for number in group:
+            block = blocks[number]
+            w = block_velocity(block, c, u, x)
+            held = [x[row] for row in block.rows]
+            if len(held) == 3:
+                new = _contact_impulses(block, friction[number], held, w)
+            else:
+                new = [_joint_impulse(block, bounds[number - len(friction)], held[0], w[0])]
+            done.append([a - b for a, b in zip(new, held, strict=True)])
+            for place, (row, step) in enumerate(zip(block.rows, done[-1], strict=True)):
+                x[row] = new[place]
+                change = maximum(change, abs(step) * block.scales[min(place, 1)])
+        for number, steps in zip(group, done, strict=True):
+            _add(u, blocks[number], steps)
     return u, x, change
+
+
+def visits(blocks: Sequence[Block]) -> list[tuple[int, ...]]:
+    """Return the numbers of the blocks of each visit: pairs of contacts on different branches, then others.
+
+    Both blocks of a pair are solved for the same u, which a processor does at the same time. Sweeps over two
+    blocks converge with a symmetric positive definite matrix whether the second one knows the first or not
+    (only more slowly); contacts on one body may have a singular one.
+    """
+    found: list[tuple[int, ...]] = []
+    left = list(range(len(blocks)))
+    while left:
+        first = left.pop(0)
+        own = blocks[first].places
+        for number in left:
+            other = blocks[number].places
+            if len(blocks[first].rows) == 3 == len(blocks[number].rows) and own - other and other - own:
+                left.remove(number)
+                found.append((first, number))
+                break
+        else:
+            found.append((first,))
+    return found
 
 
 def _contact_impulses(block: Block, mu: Any, x: Vector, w: Vector) -> Vector:
