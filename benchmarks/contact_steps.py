@@ -12,9 +12,9 @@ step of any robot in the last second [m/s]. ``penetration`` is that of a foot [m
 ``creep`` the mean speed of the standing robots' bases over the last 0.1 s [m/s]. ``weight`` is the error of
 the sum of all normal forces at the end, relative to the weight, as the median of the standing robots.
 
-With ``--further`` two more cases follow that have no counterpart: A1 with joint limits, dry friction of joints and twelve contacts (feet,
-the lowest point of each calf, the corners of the trunk), and G1 with four spheres under each foot. They
-stand.
+With ``--further`` two more cases follow that have no counterpart: A1 with joint limits, dry friction of
+joints and twelve contacts (feet, the lowest point of each calf, the corners of the trunk), and G1 with four
+spheres under each foot. They stand.
 
 The command ends with 1 if a residual of dynx exceeds 1e-6 m/s.
 """
