@@ -1,7 +1,8 @@
 """Write the tables of docs/contacts.md: the cases, and how far each engine is from mechanics in them.
 
     python -m docs.write_contacts                 # measures, which takes some minutes
-    python -m docs.write_contacts contacts.json   # takes the document that dynx contacts --json wrote
+    python -m docs.write_contacts contacts.json   # takes the document that dynx contacts --json wrote,
+                                                  # or several, each of other engines
 
 Tables stand between the marks of `docs.page_parts`; the other text of the page is kept.
 """
@@ -29,7 +30,8 @@ Entry = Mapping[str, Any]
 
 def main(arguments: Sequence[str]) -> None:
     """Write the page."""
-    report = json.loads(Path(arguments[0]).read_text(encoding="utf-8") if arguments else measured())
+    documents = [Path(each).read_text(encoding="utf-8") for each in arguments] or [measured()]
+    report = joined([json.loads(each) for each in documents])
     text = PAGE.read_text(encoding="utf-8")
     for name, part in {"cases": cases(), **results(report)}.items():
         text = replaced(PAGE, text, name, part)
@@ -44,6 +46,25 @@ def measured() -> str:
         if done.returncode not in (0, 1):
             sys.exit(done.returncode)
         return Path(path).read_text(encoding="utf-8")
+
+
+def joined(reports: Sequence[Entry]) -> Entry:
+    """One document of runs of the same cases at the same steps, each with other engines."""
+    first = reports[0]
+    if any(each["steps"] != first["steps"] for each in reports):
+        sys.exit("the documents have different steps")
+    by_name = [{case["name"]: case for case in each["cases"]} for each in reports]
+    if any(set(each) != set(by_name[0]) for each in by_name):
+        sys.exit("the documents have different cases")
+    cases_of_all = [
+        {
+            **case,
+            **{part: [x for each in by_name for x in each[name][part]] for part in ("figures", "no_results")},
+        }
+        for name, case in by_name[0].items()
+    ]
+    engines = [engine for each in reports for engine in each["engines"]]
+    return {**first, "engines": engines, "cases": cases_of_all, "runs": sum(each["runs"] for each in reports)}
 
 
 def cases() -> str:

@@ -7,6 +7,7 @@ import json
 import re
 import runpy
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,6 +69,30 @@ def test_the_cases_of_contacts_are_listed_and_have_results() -> None:
     assert current == page, "run: python -m docs.write_contacts"
     results = page.partition("<!-- written: verdicts -->")[2].partition("<!-- end -->")[0]
     assert [name for name in case_names() if f"| `{name}` |" not in results] == []
+
+
+def test_documents_of_several_engines_make_one_table() -> None:
+    whole = example("a | b")
+    names = [each["engine"] for each in whole["engines"]]
+    assert len(names) > 1
+
+    def of(engine: str) -> dict[str, Any]:
+        def own(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+            return [each for each in found if each["engine"] == engine]
+
+        cases = [
+            {**case, "figures": own(case["figures"]), "no_results": own(case["no_results"])}
+            for case in whole["cases"]
+        ]
+        return {**whole, "engines": own(whole["engines"]), "cases": cases, "runs": 1}
+
+    joined = write_contacts.joined([of(name) for name in names])
+    assert joined["runs"] == len(names)
+    parts = write_contacts.results({**joined, "runs": whole["runs"]})
+    # The engines without a coefficient come in the order of the documents.
+    assert {name: sorted(part.splitlines()) for name, part in parts.items()} == {
+        name: sorted(part.splitlines()) for name, part in write_contacts.results(whole).items()
+    }
 
 
 def test_tables_of_contacts_have_every_verdict() -> None:
