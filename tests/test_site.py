@@ -31,7 +31,10 @@ def public_names() -> dict[str, list[str]]:
             continue
         parts = path.relative_to(ROOT).with_suffix("").parts
         module = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        if module != "dynx.errors" and "__all__" not in text:
+            continue
+        tree = ast.parse(text)
         if module == "dynx.errors":
             found[module] = [each.name for each in tree.body if isinstance(each, ast.ClassDef)]
         for node in tree.body:

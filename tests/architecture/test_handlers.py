@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -51,6 +52,9 @@ ALLOWED = {
 ANYTHING = {None, "Exception", "BaseException", "builtins.Exception", "builtins.BaseException"}
 """Names of any exception; None is a handler without a name."""
 
+MAY_CATCH_ALL = re.compile(r"\bexcept\s*:|\b(Base)?Exception\b")
+"""What each handler of any exception contains; parsing the whole text of dynx takes seconds."""
+
 
 def catches_all(handler: ast.ExceptHandler) -> bool:
     """Check whether a handler takes any exception and does not end by raising it again."""
@@ -70,7 +74,10 @@ def suppresses_all(call: ast.Call) -> bool:
 def test_handlers_of_any_exception_stand_where_something_foreign_is_called() -> None:
     found: Counter[str] = Counter()
     for path in sorted((ROOT / "dynx").rglob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        if not MAY_CATCH_ALL.search(text):
+            continue
+        tree = ast.parse(text)
         handlers = [each for each in ast.walk(tree) if isinstance(each, ast.ExceptHandler)]
         suppressed = [each for each in ast.walk(tree) if isinstance(each, ast.Call)]
         found[path.relative_to(ROOT / "dynx").as_posix()] += sum(map(catches_all, handlers))
@@ -93,6 +100,7 @@ WRITTEN = {
 
 @pytest.mark.parametrize("text", WRITTEN)
 def test_every_form_of_a_handler_of_anything_is_seen(text: str) -> None:
+    assert MAY_CATCH_ALL.search(text) or not WRITTEN[text]
     nodes = list(ast.walk(ast.parse(text)))
     handlers = sum(catches_all(each) for each in nodes if isinstance(each, ast.ExceptHandler))
     assert (

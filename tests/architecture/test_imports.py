@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import re
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -23,13 +25,26 @@ def modules() -> dict[str, Path]:
     return found
 
 
+IMPORT = re.compile(r"^[ \t]*((?:from [\w.]+ import (?:\([^)]*\)|[^\n(]+)|import [^\n]+))", re.MULTILINE)
+"""An import, which may stand in a function; parsing the whole text of dynx takes seconds."""
+
+
+def statements(text: str) -> list[ast.stmt]:
+    """Return the imports in the text of a module; those in its texts do not parse, or name no module."""
+    found = []
+    for match in IMPORT.finditer(text):
+        with suppress(SyntaxError):
+            found += ast.parse(match[1].strip()).body
+    return found
+
+
 @cache
 def imports() -> dict[str, set[str]]:
     """Return the modules that the text of each module imports, without itself, whose source it may hash."""
     known = modules()
     found: dict[str, set[str]] = {module: set() for module in known}
     for module, path in known.items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in statements(path.read_text(encoding="utf-8")):
             if isinstance(node, ast.Import):
                 found[module] |= {alias.name for alias in node.names} & set(known)
             elif isinstance(node, ast.ImportFrom) and node.module in known:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -390,25 +392,24 @@ def lossy(base: Any = "fixed") -> Scene:
     return Scene("lossy", robots=(arm,), bodies=bodies, gravity=(0.3, 0.0, -3.7))
 
 
-def other_scenes() -> dict[str, Scene]:
-    """Return scenes that every engine takes, by name."""
-    return {
-        "stack": read_scene("stack"),
-        "slope": read_scene("slope"),
-        "bowling": read_scene("bowling"),
-        "arm": lossy(),
-        "floating": lossy("floating"),
-        "materials": four_materials(),
-        "random": scene_of(4),
-    }
+OTHER_SCENES: dict[str, Callable[[], Scene]] = {
+    "stack": partial(read_scene, "stack"),
+    "slope": partial(read_scene, "slope"),
+    "bowling": partial(read_scene, "bowling"),
+    "arm": lossy,
+    "floating": partial(lossy, "floating"),
+    "materials": four_materials,
+    "random": partial(scene_of, 4),
+}
+"""Scenes that every engine takes, by name."""
 
 
-@pytest.mark.parametrize("name", other_scenes())
+@pytest.mark.parametrize("name", OTHER_SCENES)
 @pytest.mark.parametrize("engine", OTHERS)
 def test_a_document_names_what_the_engine_of_its_world_has_besides(
     name: str, engine: str, tmp_path: Path
 ) -> None:
-    scene = other_scenes()[name]
+    scene = OTHER_SCENES[name]()
     options: dict[str, Any] = {"dt": 2e-3, "substeps": 2}
     setting, value = OF_OTHERS[engine]
     options_of_engine: dict[str, Any] = {setting: value}
