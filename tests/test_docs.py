@@ -72,7 +72,7 @@ def test_the_cases_of_contacts_are_listed_and_have_results() -> None:
 
 
 def test_documents_of_several_engines_make_one_table() -> None:
-    whole = example("a | b")
+    whole: dict[str, Any] = json.loads(json.dumps(example("a | b")))
     names = [each["engine"] for each in whole["engines"]]
     assert len(names) > 1
 
