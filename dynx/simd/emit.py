@@ -14,11 +14,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dynx.simd.elementary import elementary
 from dynx.simd.expr import Op
-from dynx.simd.ir_writer import Writer
+from dynx.simd.ir_writer import NONTEMPORAL, NONTEMPORAL_METADATA, Writer
 from dynx.simd.program import Port, Program, scalar_ranges
 from dynx.simd.rows import (
     FILL,
@@ -35,15 +35,21 @@ from dynx.simd.rows import (
 from dynx.simd.schedule import (
     CACHE_LINE,
     ELEMENTARY,
+    STORE_OPERATIONS,
     Segment,
     TrigGroup,
+    operation_count,
     schedule,
+    segment_operations,
     spill_slots,
     streamed_outputs,
 )
 from dynx.simd.target import Processor
 from dynx.simd.trigonometry import declarations, replacements, sines_and_cosines
 from dynx.simd.verify import check_schedule
+
+if TYPE_CHECKING:
+    from dynx.simd.streaming import Streaming
 
 ENTRY = "kernel"
 """Name of the function."""
@@ -157,11 +163,36 @@ def _functions(
         rows = scratch_functions(program, scratch, settings.lanes)
     else:
         made, slots, size = SegmentBody, spilled, max(spilled.values(), default=0) + 1
+    streaming = _streaming(program, settings, size)
     bodies = [
-        made(program, target, settings, segment, slots, number).text(linkage)
-        for number, segment in enumerate(segments)
+        made(program, target, settings, segment, slots, number) for number, segment in enumerate(segments)
     ]
-    return bodies, rows, _loop(program, settings, segments, size)
+    if streaming and not settings.quick:
+        _share_bursts(program, segments, bodies, streaming)
+    texts = [body.text(linkage) for body in bodies]
+    return texts, rows, _loop(program, settings, segments, size, streaming)
+
+
+def _streaming(program: Program, settings: Settings, slots: int) -> Streaming | None:
+    """Return what streams rows of results, if there are long ones; its jobs come after the `slots` vectors of
+    the memory of values."""
+    if not streamed_outputs(program, settings.lanes):
+        return None
+    from dynx.simd.streaming import Streaming
+
+    return Streaming(program, settings.lanes, 8 * settings.lanes * slots)
+
+
+def _share_bursts(
+    program: Program, segments: Sequence[Segment], bodies: Sequence[SegmentBody], streaming: Streaming
+) -> None:
+    """Let each segment copy a share of the rows of the group before, by its share of the operations."""
+    bursts = streaming.bursts()
+    varying = [number for number, segment in enumerate(segments) if not segment.constant]
+    work = [segment_operations(program, segments[number]) for number in varying]
+    ends = [len(bursts) * sum(work[: k + 1]) // max(sum(work), 1) for k in range(len(work))]
+    for number, begin, end in zip(varying, [0, *ends], ends, strict=False):
+        bodies[number].copy_between(bursts[begin:end])
 
 
 def _called(segments: int, settings: Settings) -> list[str]:
@@ -173,17 +204,23 @@ def _called(segments: int, settings: Settings) -> list[str]:
 def _module(functions: Sequence[str], target: Processor, settings: Settings) -> str:
     parts = [f'target triple = "{target.triple}"', *functions, *replacements(functions, settings.lanes)]
     parts += [*declarations(settings.lanes), DECLARED_PREFETCH]
+    if any(NONTEMPORAL in function for function in functions):
+        parts.append(NONTEMPORAL_METADATA)
     return "\n".join(parts) + "\n"
 
 
-def _loop(program: Program, settings: Settings, segments: Sequence[Segment], slots: int) -> str:
+def _loop(
+    program: Program,
+    settings: Settings,
+    segments: Sequence[Segment],
+    slots: int,
+    streaming: Streaming | None,
+) -> str:
     """Return the entry function, a loop over groups of `lanes` samples, of which the last may overlap; and
     what it needs to stream rows of results."""
-    lanes, streaming = settings.lanes, None
-    if streamed_outputs(program, lanes):
-        from dynx.simd.streaming import Streaming
-
-        streaming = Streaming(program, lanes)
+    lanes = settings.lanes
+    if streaming:
+        slots += -(-streaming.job_bytes // (8 * lanes))
     called = _called(len(segments), settings)
     constant = [] if settings.quick else [f"segment{k}" for k, each in enumerate(segments) if each.constant]
     words, start = ("%words", "begin") if streaming else ("%arguments", "entry")
@@ -296,6 +333,10 @@ class SegmentBody:
         """Inputs of one column."""
         self._stored_columns: list[str] = []
         """Code that stores the outputs of one column."""
+        self._bursts: Sequence[int] = ()
+        """Jobs of the bursts (`dynx.simd.streaming`) that are still to be written."""
+        self._interval = self._since_burst = 0.0
+        """Operations from one burst to the next, and since the last."""
         self._slot_port = [
             (k, column) for k, port in enumerate(program.inputs) for column in range(port.size)
         ]
@@ -314,6 +355,20 @@ class SegmentBody:
         lines = [*columns, *heads, *self._write.lines, *self._stored_columns]
         return "\n".join([head, "entry:", *lines, "  ret void", "}"])
 
+    def copy_between(self, bursts: Sequence[int]) -> None:
+        """Let the segment copy rows between its operations: `bursts` are the places of their jobs."""
+        self._bursts = bursts
+        self._interval = segment_operations(self._program, self._segment) / max(len(bursts), 1)
+
+    def _pass(self, operations: int) -> None:
+        """Copy rows if it is time to, after so many more operations."""
+        self._since_burst += operations
+        while self._bursts and self._since_burst >= self._interval:
+            from dynx.simd.streaming import copy_burst
+
+            copy_burst(self._write, self._bursts[0])
+            self._bursts, self._since_burst = self._bursts[1:], self._since_burst - self._interval
+
     # -- values -------------------------------------------------------------------------------------
 
     def _compute_steps(self) -> None:
@@ -322,6 +377,7 @@ class SegmentBody:
                 self._trig(step)
             else:
                 self._compute(step)
+                self._pass(operation_count(self._program, step))
 
     def _value(self, index: int) -> str:
         """Return the name of a node's vector: computed here, in memory, constant, or an input."""
@@ -420,6 +476,7 @@ class SegmentBody:
                 self._stored_columns += store_column(number, lanes, *values)
             else:
                 self._rows[number].store_tile(columns.start, values)
+            self._pass(STORE_OPERATIONS)
 
     def _pointers(self, port: int) -> list[str]:
         """Return the row pointers of one array, one per lane, which the head of the function computes."""

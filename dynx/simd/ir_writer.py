@@ -9,6 +9,11 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
+NONTEMPORAL = "!nontemporal !1"
+"""Ending of a store past the caches, in a module with `NONTEMPORAL_METADATA`."""
+
+NONTEMPORAL_METADATA = "!1 = !{i32 1}"
+
 
 class Writer:
     """Lines of one function body, with fresh names for its values.

@@ -26,6 +26,10 @@ MAX_STORES = 24
 compile as thousands of operations."""
 
 
+STORE_OPERATIONS = 12
+"""Approximate number of operations of the store of a tile."""
+
+
 MAX_ANGLES = 24
 """Most angles of one group; a group is compiled in one piece."""
 
@@ -77,11 +81,11 @@ def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
     A group of angles is never divided. Constants in streamed rows are stored by segments of their own.
     """
     steps = list(_steps(program))
-    if sum(_operation_count(program, step) for step in steps) > longest:
+    if sum(operation_count(program, step) for step in steps) > longest:
         longest = max(longest // 2, 1)
     segments, segment_of, length = [Segment()], {}, 0
     for step in steps:
-        size = _operation_count(program, step)
+        size = operation_count(program, step)
         if length and length + size > longest:
             segments.append(Segment())
             length = 0
@@ -117,7 +121,7 @@ def _divide_stores(segment: Segment) -> Iterator[Segment]:
 def program_length(program: Program) -> int:
     """Return the approximate number of operations of a program, of which every result takes two."""
     operations = sum(
-        25 if node.op in TRIG else _operation_count(program, index)
+        25 if node.op in TRIG else operation_count(program, index)
         for index, node in enumerate(program.nodes)
         if node.op not in LEAVES
     )
@@ -141,7 +145,13 @@ def spill_slots(program: Program, segments: Sequence[Segment]) -> dict[int, int]
     return places
 
 
-def _operation_count(program: Program, step: Step) -> int:
+def segment_operations(program: Program, segment: Segment) -> int:
+    """Return the approximate number of operations of a segment with its stores, without sines and cosines."""
+    steps = sum(operation_count(program, step) for step in segment.steps if isinstance(step, int))
+    return steps + STORE_OPERATIONS * len(segment.stores)
+
+
+def operation_count(program: Program, step: Step) -> int:
     """Return the approximate number of operations of a step."""
     if isinstance(step, TrigGroup):
         return 50 * len(step.angles)

@@ -73,7 +73,7 @@ def test_streamed_rows_have_the_bits_of_others(
 
 def test_rows_are_streamed_from_the_stated_size_on() -> None:
     """The two ways cannot be told apart by results, but by the code that decides."""
-    streaming = Streaming(program(), 8)
+    streaming = Streaming(program(), 8, 0)
     row = 8 * sum(size for size in SIZES if size >= MIN_COLUMNS)
     samples = -(-dynx.simd.streaming.MIN_STREAMED // row)
     assert f"  %streams = icmp sge i64 %n, {samples}" in streaming.begin([])
