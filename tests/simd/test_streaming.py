@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dynx.simd.streaming
-from dynx.simd.emit import Settings
+from dynx.simd.emit import Settings, emit
 from dynx.simd.program import Program
 from dynx.simd.schedule import MAX_BLOCK, MIN_COLUMNS, streamed_outputs
 from dynx.simd.streaming import Streaming
@@ -84,3 +84,13 @@ def test_rows_too_long_for_the_block_and_short_rows_are_not_streamed() -> None:
     long = trace(lambda x: {"y": np.full(size, 1.0) * x[0], "z": np.full(130, 1.0) * x[0]}, {"x": (1,)})
     assert streamed_outputs(long, 8) == [1]
     assert streamed_outputs(program(), 8) == [0, 1, 3]
+
+
+def test_rows_are_copied_between_the_operations() -> None:
+    """Every burst of a group stands in the code of a segment, however the program is divided."""
+    bursts = len(Streaming(program(), 4, 0).bursts())
+    assert bursts > 3
+    for segment in (30, 2500):
+        text = emit(program(), TARGETS[0], Settings(4, segment=segment))
+        # Two functions copy what is no whole burst, and what is left at the end.
+        assert text.count("!nontemporal") == 2 * (bursts + 2)
