@@ -172,7 +172,7 @@ class ClassRegistry(Generic[Kind]):
         return tuple(dict.fromkeys([*self.built_in, *self._registered, *points]))
 
     def register(self, name: str, loader: Callable[[], type[Kind]]) -> None:
-        """Add a class of the running program; dynx calls `loader()`, which returns it, at the first use.
+        """Add a class of the running program. `loader()` returns the class; dynx calls it at the first use.
 
         Raises ArgumentError for a name that is taken: a class is never replaced. Installed packages add their
         classes by entry points.

@@ -36,12 +36,13 @@ by the name of the joint (`coefficients_by_joint`), where joints that are not na
 class JointFriction:
     """Torque that overcomes damping and dry (Coulomb) friction: d v + f tanh(v / slip), with the sign of v.
 
-    Inverse dynamics adds it to the joint torque; the friction that acts on the joint is its negative.
+    Inverse dynamics adds this torque to the joint torque. The friction that acts on the joint is its
+    negative.
 
-    With `slip` 0 it is d v + f sign(v), as with ``joint_dynamics=True`` in every backend. A joint at rest
-    then has the torque between -f and f that keeps it at rest. This torque is no function of the velocity, so
-    plants solve for it (`dynx.rbd.joint_friction`). A mimic joint's coefficients act on its independent joint
-    through its multiplier.
+    With `slip` 0 the torque is d v + f sign(v), as with ``joint_dynamics=True`` in every backend. For a joint
+    at rest, the torque between -f and f keeps the joint at rest. This torque is not a function of the
+    velocity, so plants solve an equation for it (`dynx.rbd.joint_friction`). The coefficients of a mimic
+    joint act on the joint that it follows, through the multiplier.
     """
 
     model: Model
@@ -107,8 +108,8 @@ class JointFriction:
 
     @property
     def sticks(self) -> bool:
-        """True if any coefficient is not zero, of damping too, and `slip` is 0: each step is then solved for
-        the torque."""
+        """True if any coefficient is not zero and `slip` is 0: each step then solves an equation for the
+        torque."""
         return self.present and not self.slip
 
     @property

@@ -71,11 +71,13 @@ def parameter(unit: str, *, argument: str | None = None) -> Any:
 class Controller(ABC, Generic[ControllerState]):
     """A controller of one robot; `ControllerState` is the type of its state (None for most).
 
-    A controller of your own is a subclass with `torque`, and with `initial_state` if it has a state. It is
-    best a frozen dataclass, which is compared, printed and serialised by its fields. If it modifies the
-    torque of another controller, the other controller is its attribute `inner`. If it evaluates a model, the
-    result of `model_dynamics` is one of its attributes. It must not change its own attributes. Several
-    threads may share it if they may share its backend.
+    Your own controller is a subclass with `torque`, and with `initial_state` if it has a state:
+
+    - The best form is a frozen dataclass, which dynx compares, prints and serialises by its fields.
+    - If the controller modifies the torque of another controller, its attribute `inner` is the other one.
+    - If the controller evaluates the dynamics of a model, the result of `model_dynamics` is an attribute.
+    - The controller must not change its own attributes.
+    - Several threads may share the controller if they may share its backend.
     """
 
     lead: int = 0
@@ -121,7 +123,7 @@ class Controller(ABC, Generic[ControllerState]):
 
     @checks_types
     def on(self: Self, engine: str | Backend) -> Self:
-        """Return a controller whose model another backend evaluates; `self` if it evaluates no model."""
+        """Return this controller with another backend; `self` if the controller evaluates no model."""
         changes = _with_dynamics(self, lambda own: EngineDynamics(engine_of(own.model, engine)))
         inner = getattr(self, "inner", None)
         if isinstance(inner, Controller):
@@ -191,10 +193,10 @@ class Controller(ABC, Generic[ControllerState]):
 class ModelBased(Controller[ControllerState]):
     """A controller that evaluates the dynamics of its model with a backend.
 
-    With `joint_dynamics` it includes the damping, dry friction, armature and springs of the description, as a
-    backend does with the option of that name. By default it computes with rigid bodies alone. It compensates
-    dry friction along the velocity of the setpoint, which moves joints that stick and cannot make them
-    unstable. It commands every coordinate, so a floating base, which has no motor, is refused.
+    By default the controller computes with rigid bodies alone. With `joint_dynamics=True` it includes the
+    damping, dry friction, armature and springs of the description. It then compensates dry friction along the
+    velocity of the setpoint. This moves joints that stick, and cannot make a joint unstable. The controller
+    needs a motor on every coordinate, so it refuses a floating base.
     """
 
     model: Model
@@ -356,9 +358,9 @@ def engine_of(model: Model, engine: str | Backend) -> Backend:
 def model_dynamics(model: Model, backend: str | Backend = "pinocchio") -> Dynamics:
     """Return the dynamics of `model`, for a controller of your own that evaluates them in `torque`.
 
-    `backend` is a name, or a backend of an equal model. Make the result an attribute of the controller. The
-    backend evaluates it, and compiled code does so in compiled steps and batches. Raises ArgumentError for a
-    backend of another robot.
+    `backend` is a name, or a backend of an equal model. Make the result an attribute of your controller. The
+    backend evaluates the dynamics; in compiled steps and batches compiled code evaluates them. Raises
+    ArgumentError for a backend of another robot.
     """
     return EngineDynamics(engine_of(model, backend))
 

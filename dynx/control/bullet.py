@@ -162,7 +162,8 @@ class BulletPDMotor(BulletMotor):
 class BulletTorqueMotor(BulletMotor):
     """PyBullet's TORQUE_CONTROL: the torque of another controller, passed to the engine's motors unchanged.
 
-    The plant does the same with any controller; this class exists so that all four modes have a name.
+    The plant ``pybullet`` applies the torque of any controller in this way. The class exists to give all four
+    modes a name.
     """
 
     model: Model = field(init=False)

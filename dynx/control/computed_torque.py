@@ -25,10 +25,11 @@ from dynx.trajectory.base import Setpoint
 class ComputedTorque(ModelBased[None], pure=True):
     """tau = ID(q, v, a* + kd (v* - v) + kp (q* - q)).
 
-    With an exact model the error of each coordinate obeys e'' + kd e' + kp e = 0, independent of the others
-    (Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 8.3). In discrete time an error of
-    about dt a* kd / (2 kp) remains, which `DiscreteComputedTorque` does not have. With `joint_dynamics` ID
-    includes the joint dynamics of the description.
+    ID is inverse dynamics; q*, v* and a* are the setpoint. With an exact model the error e of each coordinate
+    obeys e'' + kd e' + kp e = 0, independent of the other coordinates (Spong, Hutchinson and Vidyasagar,
+    Robot Modeling and Control, section 8.3). In discrete time an error of about dt a* kd / (2 kp) remains;
+    `DiscreteComputedTorque` does not have this error. With `joint_dynamics` ID includes the joint dynamics of
+    the description.
     """
 
     kp: Floats = gain("1/s^2")
@@ -82,14 +83,13 @@ def commanded_acceleration(
 class DiscreteComputedTorque(ModelBased[None], pure=True):
     """Torque with which one step of semi-implicit Euler ends exactly at the next setpoint.
 
-    The step of Bullet, and dynx's default, is v' = v + dt a, q' = q + dt v'. Solved for a it gives a = ((q* -
-    q) / dt - v) / dt, where q* is the setpoint at the end of the step. The tracking error is then round-off.
-    An initial error is removed in one step, however large the torque, and velocities are the difference
-    quotients of the reference.
+    The step of Bullet, and dynx's default, is v' = v + dt a, q' = q + dt v'. The controller solves these
+    equations for a = ((q* - q) / dt - v) / dt, where q* is the setpoint at the end of the step. Only rounding
+    errors remain. The controller removes an initial error in one step, however large the torque.
 
-    It is exact if the control step equals the physics step, and if the plant has no joint dynamics or the
-    controller knows them (`joint_dynamics`). Joint dynamics act at the end of the step. With another plant
-    (RK4, sub-steps) an error of the order of dt remains.
+    The controller is exact under two conditions. The control step equals the step of the plant. The plant has
+    no joint dynamics, or the controller knows them (`joint_dynamics`). With another plant (RK4, sub-steps) an
+    error of the order of dt remains.
     """
 
     control_dt: float = parameter("s")
@@ -104,7 +104,10 @@ class DiscreteComputedTorque(ModelBased[None], pure=True):
         joint_dynamics: bool = False,
         backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
-        """`control_dt` [s] is the plant's step. Raises ArgumentError if it is not positive."""
+        """`control_dt` [s] is the control step, equal to the step of the plant.
+
+        Raises ArgumentError if it is not positive.
+        """
         super().__init__(model, backend, joint_dynamics)
         self._set(control_dt=positive_seconds("control_dt", control_dt))
 

@@ -20,10 +20,12 @@ SPEEDS = ("measured", "setpoint")
 class FrictionCompensation(Wrapper[ControllerState], pure=True):
     """Torque of another controller plus d v + f tanh(v / slip), where v is measured or that of the setpoint.
 
-    With the measured speed, the friction of a moving plant is cancelled if the coefficients are those of the
-    plant. But noise or overestimated friction may make the joint unstable. A joint that sticks gets no
-    compensation, because its speed is 0. The speed of the setpoint cannot make the joint unstable, and moves
-    a joint that sticks. With ``slip=0`` the torque breaks a joint loose as soon as the setpoint moves.
+    By default v is the measured velocity. If the coefficients equal those of the plant, the compensation
+    cancels the friction of a moving joint. Noise or overestimated friction may make the joint unstable. A
+    joint that sticks gets no compensation, because its velocity is 0.
+
+    With ``speed="setpoint"`` v is the velocity of the setpoint. The compensation cannot make the joint
+    unstable, and moves a joint that sticks. With ``slip=0`` it does so as soon as the setpoint moves.
     """
 
     damping: bool | Floats = parameter("N m s/rad or N s/m")
@@ -42,7 +44,7 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
         speed: str = "measured",
     ) -> None:
         """The coefficients are as in `JointFriction`. If you give neither, both are those of the description.
-        If you give one, the other is 0, because a torque along the speed drives a plant without damping away.
+        If you give only one, the other is 0.
         """
         if damping is None and friction is None:
             damping = friction = True

@@ -139,9 +139,10 @@ class Velocity(JointSpace[None], pure=True):
 class PID(JointSpace[Floats], pure=True):
     """tau = kp e + kd e' + z with z' = ki e, saturated at the effort limits.
 
-    Anti-windup is by back-calculation (Astrom and Murray, Feedback Systems, section 11.4). The torque beyond
-    the limits is fed back into z with the time constant `tracking_time`, so z stays within the range of the
-    motors. The state is z (n,) [N m or N], the integral part of the torque.
+    Here e is the position error, and z (n,) [N m or N] is the integral part of the torque: the controller
+    state. Anti-windup is by back-calculation (Astrom and Murray, Feedback Systems, section 11.4): the torque
+    beyond the limits is fed back into z with the time constant `tracking_time`. So z stays within the range
+    of the motors.
     """
 
     kp: Floats = gain("N m/rad or N/m")
@@ -197,11 +198,11 @@ class PID(JointSpace[Floats], pure=True):
 @checks_types
 @dataclass(frozen=True)
 class GravityCompensatedPD(ModelBased[None], pure=True):
-    """PD control with gravity compensation, so that there is no error at rest.
+    """PD control with gravity compensation, without an error at rest.
 
-    Globally asymptotically stable for a constant setpoint (Takegaki and Arimoto 1981; Siciliano et al.,
-    Robotics, section 8.5.1). With `joint_dynamics` it also compensates the torque of springs, and damping and
-    friction at the setpoint's velocity.
+    The closed loop is globally asymptotically stable for a constant setpoint (Takegaki and Arimoto 1981;
+    Siciliano et al., Robotics, section 8.5.1). With `joint_dynamics` the controller also compensates the
+    torque of springs, and damping and friction at the setpoint's velocity.
     """
 
     kp: Floats = gain("N m/rad or N/m")
@@ -238,9 +239,9 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
 @checks_types
 @dataclass(frozen=True)
 class FeedForward(ModelBased[None], pure=True):
-    """Inverse dynamics of the setpoint, and with gains PD control of the remaining error.
+    """Inverse dynamics of the setpoint; if gains are given, also PD control of the error.
 
-    Without gains there is no feedback: errors are not corrected, and gravity makes them grow.
+    Without gains no feedback corrects errors, and gravity makes them grow.
     """
 
     kp: Floats = gain("N m/rad or N/m")

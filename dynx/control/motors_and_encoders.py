@@ -57,11 +57,11 @@ class _StatefulWrapper(Wrapper[Floats]):
 
 @dataclass(frozen=True)
 class MotorLag(_StatefulWrapper, pure=True):
-    """Another controller's torque as a motor follows it: `delay` later, with a lag of first order.
+    """Another controller whose torque acts through motors: `delay` later, with a lag of first order.
 
-    The torque y of the motor obeys dy/dt = (u - y) / time_constant, where u is the delayed torque of the
-    inner controller, constant in a control step. The plant gets the mean of y over each step, so the impulse
-    is exact. The state is the torques that are under way (delay / control_dt, nv), and y.
+    The torque y of the motor obeys dy/dt = (u - y) / time_constant. Here u is the delayed torque of the inner
+    controller, which is constant in a control step. The plant gets the mean of y over each step, so the
+    impulse is exact. The controller state has the torques that are delayed (delay / control_dt, nv), and y.
     """
 
     control_dt: float = parameter("s")
@@ -102,8 +102,7 @@ class MotorLag(_StatefulWrapper, pure=True):
         )
 
     def initial_state(self) -> Floats:
-        """Return the state before the first step, in which all torques under way and that of the motor are
-        `initial`."""
+        """Return the state before the first step: delayed torques and motor torques are `initial`."""
         return self._joined(np.tile(self.initial, self._steps + 1))
 
     @checks_types
@@ -136,10 +135,10 @@ class MotorLag(_StatefulWrapper, pure=True):
 class Encoders(_StatefulWrapper, pure=True):
     """Another controller that measures by encoders: positions are whole multiples of `resolution`.
 
-    Velocities are differences of two such positions, over `control_dt`; in the first step the velocity is 0.
-    The simulation applies its noise and delay before the encoders round. The state is the last position (n,)
-    in multiples, and whether there is one. The pose and the twist of a floating base are not measured by
-    encoders.
+    A velocity is the difference of two such positions, divided by `control_dt`; in the first step it is 0.
+    The simulation applies its noise and delay before the encoders round. The controller state has the last
+    position (n,) in multiples of `resolution`, and whether a last position exists. Encoders do not measure
+    the pose and the twist of a floating base.
     """
 
     control_dt: float = parameter("s")

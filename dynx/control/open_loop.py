@@ -19,7 +19,8 @@ from dynx.trajectory.base import Setpoint
 @checks_types
 @dataclass(frozen=True)
 class OpenLoop(Controller[None], pure=True):
-    """Controller that applies row k of a table of torques from time k control_dt on, and then zero torque."""
+    """Controller that applies row k of a table of torques from time k control_dt on, and zero after the
+    table."""
 
     model: Model
     torques: Floats = parameter("N m or N")

@@ -22,7 +22,8 @@ from dynx.trajectory.base import Setpoint
 class Saturated(Wrapper[ControllerState], pure=True):
     """Another controller's torque, saturated at the limits of the motors.
 
-    `dynx.simulate(..., effort_limits=True)` saturates in the plant instead, and records at which steps.
+    With `dynx.simulate(..., effort_limits=True)` the plant saturates the torque instead, and the record
+    has the steps in which it did.
     """
 
     limit: Floats = parameter("N m or N")

@@ -65,9 +65,10 @@ class TaskSpace(ModelBased[ControllerState]):
 class Impedance(TaskSpace[None], pure=True):
     """tau = J' (K e + D e') + g(q) - B v, without shaping the inertia.
 
-    It is passive for a reference at rest: it supplies no energy to its environment (Hogan 1985; Siciliano et
-    al., Robotics, section 9.2). A steady force F displaces the frame by F / K. With `joint_dynamics` it
-    compensates damping and friction at the setpoint's velocity.
+    e is the error of the frame, K the `stiffness`, D the `damping` and B the `joint_damping`. For a reference
+    at rest the controller is passive: it supplies no energy to its environment (Hogan 1985; Siciliano et al.,
+    Robotics, section 9.2). A steady force F displaces the frame by F / K. With `joint_dynamics` the
+    controller compensates damping and friction at the setpoint's velocity.
     """
 
     stiffness: Floats = gain("N/m, N m/rad")
@@ -111,9 +112,10 @@ class Impedance(TaskSpace[None], pure=True):
 class OperationalSpace(TaskSpace[None], pure=True):
     """Computed torque in the space of a frame (Khatib 1987; Siciliano et al., Robotics, section 8.6.2).
 
-    The frame's error e obeys e'' + kd e' + kp e = 0. Joint accelerations that do not accelerate the frame
-    move the posture to the setpoint, by the projector of the dynamically consistent inverse J# = M^-1 J' (J
-    M^-1 J' + damping^2)^-1. `damping` keeps the torque finite near singular postures, and causes an error.
+    The error e of the frame obeys e'' + kd e' + kp e = 0. Joint accelerations without effect on the frame
+    move the posture to the setpoint. Their projector follows from the dynamically consistent inverse J# =
+    M^-1 J' (J M^-1 J' + damping^2)^-1. `damping` keeps the torque finite near singular postures, but causes
+    an error.
     """
 
     kp: Floats = gain("1/s^2")

@@ -133,7 +133,7 @@ def integrate(tree: Tree, q: ArrayLike, v: ArrayLike) -> Floats:
 
 
 def difference(tree: Tree, q0: ArrayLike, q1: ArrayLike) -> Floats:
-    """Return the velocity v (..., nv) with integrate(q0, v) = q1, whose rotation angles are at most pi."""
+    """Return the velocity v (..., nv) with integrate(q0, v) = q1. Its angles of rotation are at most pi."""
     if tree.floating and not tree.ball_joints and type(q0) is type(q1) is np.ndarray:
         velocity = np.empty(tree.nv)
         if _subtraction.function(q0, q1, velocity) == _ACCEPTED:

@@ -210,9 +210,9 @@ class JointDynamics:
     """Viscous damping, Coulomb friction, armature (reflected rotor inertia) and spring of a joint (see
     `Backend`).
 
-    The spring pulls with ``-stiffness (q - spring_reference)``; `stiffness` is in N m/rad or N/m,
-    `spring_reference` in rad or m, and 0 for a joint without a spring, where it means nothing. The other
-    three of a ball joint act about each axis of its child; a ball joint has no spring.
+    The torque of the spring is ``-stiffness (q - spring_reference)``; `stiffness` is in N m/rad or N/m,
+    `spring_reference` in rad or m. Without a spring both are 0. A ball joint has no spring; its damping,
+    friction and armature act about each axis of its child link.
     """
 
     damping: float = 0.0
@@ -275,13 +275,14 @@ class Mimic:
 @checks_types
 @dataclass(frozen=True)
 class Joint:
-    """A joint from link `parent` to link `child`; `origin` is the pose of its frame in the parent at position
-    0.
+    """A joint from link `parent` to link `child`.
+
+    `origin` is the pose of the joint frame in the frame of the parent, at position 0.
 
     `axis` is a unit vector in the joint frame; that of a ball joint is the default. `locked_at` is the
-    position at which a movable joint was locked; its type is then ``fixed`` and `origin` includes that
-    position. A joint that is ``fixed`` in the description has the default axis, limits, dynamics and mimic,
-    whatever is given, because they have no meaning for such a joint.
+    position at which a joint was locked; its type is then ``fixed``, and `origin` includes this position. A
+    joint that is ``fixed`` in the description always has the default axis, limits, dynamics and mimic, which
+    have no meaning for such a joint.
     """
 
     name: str
@@ -333,8 +334,9 @@ class Actuator:
 
     With the command u, and the position q and velocity v of the joint, the force is
     ``f = gain u + bias[0] + bias[1] gear q + bias[2] gear v``, and the effort is ``gear f`` [N m or N], as in
-    MuJoCo. u is kept within `control_range`, f within `force_range`. `name` may be empty. If the actuator
-    acts on a `tendon`, `joint` is empty; q, v and the effort are length, velocity and tension of that.
+    MuJoCo. MuJoCo limits u to `control_range` and f to `force_range`. `name` may be empty. If the actuator
+    acts on a `tendon`, `joint` is empty, and q, v and the effort are those of the tendon: length, velocity
+    and tension.
     """
 
     name: str
@@ -354,7 +356,7 @@ class NamedConfiguration:
 
     `positions` are the positions of joints by name: one number [rad or m], or the unit quaternion (x, y, z,
     w) of a ball joint. `base` is the pose of a floating base in the world: position [m] and unit quaternion
-    (x, y, z, w). What is not stated is neutral.
+    (x, y, z, w). Joints without an entry, and a base without a pose, are neutral.
     """
 
     name: str

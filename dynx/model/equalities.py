@@ -16,21 +16,21 @@ LINEAR: Polynomial = (0.0, 1.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class StatedEquality:
-    """Equality constraint of a robot, as its description states it. It is data: loops stay open in dynx, and
-    joints that it couples move freely.
+    """Equality constraint of a robot, as its description states it. It is data: in dynx a loop that it closes
+    stays open, and joints that it couples move independently.
 
     `type` is that of MuJoCo: ``"connect"``, ``"weld"``, ``"joint"`` or ``"tendon"``. `first` and `second`
-    name what it couples, and `object_type` their kind: ``"site"`` (frames of the model), ``"xbody"`` (links,
-    and ``"world"`` for the world), ``"joint"`` or ``"tendon"``. `second` is empty if one joint or tendon
-    alone is held.
+    name the two objects, and `object_type` their kind: ``"site"`` (frames of the model), ``"xbody"`` (links,
+    and ``"world"`` for the world), ``"joint"`` or ``"tendon"``. If the constraint holds one joint or tendon
+    alone, `second` is empty.
 
-    A ``connect`` lets the origins of two poses coincide, `first_pose` in the first link and `second_pose` in
-    the second one, and a ``weld`` the poses. Of frames, both poses are the identity. `torque_scale` weighs
-    the rotation of a ``weld`` against its translation.
+    `first_pose` is a pose in the first link, `second_pose` a pose in the second link; for frames, both are
+    the identity. A ``connect`` makes the origins of both poses coincide, and a ``weld`` the poses themselves.
+    `torque_scale` weighs the rotation of a ``weld`` against its translation.
 
     A coupling of joints or tendons is ``y - references[0] = p(x - references[1])``, with the polynomial p of
-    these five coefficients, the constant one first. y and x are the positions of the joints [rad or m] or
-    the lengths of the tendons, first and second. Without a second one, y is constant.
+    the five coefficients `polynomial`, the constant one first. y and x are the positions [rad or m] of the
+    first and the second joint, or the lengths of the tendons. Without a second object, y is constant.
 
     MuJoCo ignores a constraint that is not `active`. `solref` and `solimp` are its parameters of softness,
     empty for MuJoCo's defaults. `name` may be empty.

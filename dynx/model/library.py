@@ -69,8 +69,9 @@ class LibraryRobot:
 
 @lru_cache(maxsize=1)
 def robots() -> tuple[LibraryRobot, ...]:
-    """List the robots of the library, without the traps: example-robot-data, then dynx's own, each sorted by
-    name. dynx searches for them once per process.
+    """List the robots of the library: those of example-robot-data, then dynx's own, each sorted by name.
+
+    The list does not contain the traps of the doctor. dynx searches for robots once per process.
 
     Names are unique. The alias of a robot is the stem of its file, unless a robot has this name or another
     file has this stem.

@@ -47,20 +47,19 @@ def load(
     - text of URDF, MJCF or SDF: a `str` or `bytes` that begins with ``<`` after white space or a byte-order
       mark;
     - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro, .xml, .mjcf,
-      .sdf or .world (.xacro needs the extra ``xacro``, which evaluates expressions of a file as Python
-      code: expand only files that you trust). Such a string is never looked up as a name. Arguments of a
-      xacro file follow its path in a `str`, as ROS writes them: ``"ur.urdf.xacro name:=ur ur_type:=ur5e"``.
-      Where a `str` is no file, it may be one of ``pybullet_data``, as PyBullet finds it, such as
-      ``plane.urdf``;
+      .sdf or .world. Such a string is never the name of a robot. If the file does not exist, dynx searches
+      the package ``pybullet_data``, as PyBullet does, for example for ``plane.urdf``. A .xacro file needs the
+      extra ``xacro``, which evaluates expressions of the file as Python code: expand only files that you
+      trust. Arguments of a xacro file follow its path: ``"ur.urdf.xacro name:=ur ur_type:=ur5e"``;
     - ``package://NAME/FILE``: a file of a package in `package_dirs`, in ROS_PACKAGE_PATH or
       AMENT_PREFIX_PATH, or of the Python package ``pybullet_data``; never one outside the package;
-    - the name of a robot in the library, see ``dynx robots``. It takes precedence over a file of that name in
-      the working directory; write ``./name`` for the file. A name that is not in the library may be a file
-      of ``pybullet_data`` without its suffix, such as ``r2d2``, or any file;
-    - a `Model`, whose base, base pose and gravity are kept unless you give others.
+    - the name of a robot in the library (see ``dynx robots``). For a file of this name in the working
+      directory, write ``./name``. If the library does not have the name, dynx searches ``pybullet_data`` for
+      a file of this name without suffix, such as ``r2d2``, then the working directory;
+    - a `Model`. Its base, base pose and gravity are kept unless you give others.
 
-    `base` is ``"fixed"`` (default) or ``"floating"``; MJCF and SDF state their own, and the gravity. `lock`
-    fixes joints, by name, at positions [rad or m]; they are removed from q. `gravity` is (3,) [m/s^2] in
+    `base` is ``"fixed"`` (default) or ``"floating"``. MJCF and SDF state their base and gravity. `lock` fixes
+    joints, by name, at positions [rad or m]; a locked joint has no entry in q. `gravity` is (3,) [m/s^2] in
     world axes, by default (0, 0, -9.81). `base_pose` is the pose of the root link of a fixed base in the
     world, by default the identity. It is a `Pose`, a matrix (4, 4) or a pair of position and quaternion (x,
     y, z, w). Packages and meshes are searched in the folders `package_dirs` and around the file.

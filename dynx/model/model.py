@@ -37,11 +37,11 @@ class Model(Tree):
     frame. In v it has the angular velocity of the child relative to the parent, in the axes of the child. A
     fixed base has the pose `base_pose` in the world.
 
-    `geometry` holds the visual and collision shapes of the links, `contact_filter` which of them may touch,
-    `configurations` which positions have names. `actuators`, `sensors`, `tendons`, `equalities` and
-    `gravity_compensation` are data. All affect no dynamics, so models that differ in them alone are equal.
+    `geometry` has the visual and collision shapes of the links, `contact_filter` the shapes that may touch,
+    and `configurations` the named configurations. `actuators`, `sensors`, `tendons`, `equalities` and
+    `gravity_compensation` are data. None of these fields affects the dynamics, and `==` ignores them.
 
-    Models are immutable; they compare by content (`==`), hash and pickle.
+    Models are immutable. You can compare them by content (`==`), hash and pickle them.
     """
 
     @classmethod
@@ -137,8 +137,10 @@ class Model(Tree):
 
     @checks_types
     def with_base(self, base: Base) -> Model:
-        """Return the same robot with that kind of base; `base_pose` is kept for a fixed base only, because a
-        floating one has its pose in q."""
+        """Return the same robot with another kind of base.
+
+        A fixed base keeps its `base_pose`; a floating base has its pose in q.
+        """
         base_pose = IDENTITY if base == "floating" else self.base_pose
         return replace(self, base=checked_base(base), base_pose=base_pose)
 

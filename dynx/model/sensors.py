@@ -10,12 +10,12 @@ class StatedSensor:
     """Sensor of a robot, as its description states it. It is only data: dynx simulates only the sensors of
     scenes and simulations (`dynx.world.sensors`).
 
-    `type` is MuJoCo's name of the type, such as ``"gyro"``. `object` names what is sensed, and `object_type`
-    its kind: ``"site"`` (a frame of the model), ``"xbody"`` (a link), ``"body"`` (a link; MuJoCo senses the
-    frame of its inertia), ``"geom"``, ``"joint"``, ``"tendon"``, ``"actuator"``, ``"camera"``, or ``""`` for
-    nothing. `reference` and `reference_type` are the second object of those that have two. `cutoff` bounds
-    the absolute value, unless it is 0, and `noise` is a standard deviation, both in the unit of the reading.
-    `name` may be empty.
+    `type` is MuJoCo's name of the type, such as ``"gyro"``. `object` names the object of the sensor, and
+    `object_type` the kind of this object: ``"site"`` (a frame of the model), ``"xbody"`` (a link), ``"body"``
+    (a link; MuJoCo senses the frame of its inertia), ``"geom"``, ``"joint"``, ``"tendon"``, ``"actuator"``,
+    ``"camera"``, or ``""`` for nothing. `reference` and `reference_type` are the second object of a sensor
+    with two objects. `cutoff` bounds the absolute value, unless it is 0, and `noise` is a standard deviation,
+    both in the unit of the reading. `name` may be empty.
     """
 
     name: str

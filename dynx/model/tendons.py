@@ -13,10 +13,10 @@ class StatedTendon:
 
     `terms` are pairs of a joint and a coefficient. The length of the tendon is the sum of coefficient times
     position of the joint [rad or m], and its velocity follows. The limits `range` are those of the length.
-    In MuJoCo a tendon pulls with the tension ``stiffness (spring_length[0] - length)`` if it is shorter than
-    `spring_length`, which is a range, and with ``stiffness (spring_length[1] - length)`` if it is longer. To
-    this it adds ``-damping velocity`` and the dry `friction`. The effort of each joint is the coefficient
-    times the tension. `spring_length` is 0 without stiffness, where it means nothing. `armature` adds
+    `spring_length` is a range of lengths without a spring force; it is 0 if `stiffness` is 0. In MuJoCo a
+    tendon shorter than this range has the tension ``stiffness (spring_length[0] - length)``, and a longer
+    tendon ``stiffness (spring_length[1] - length)``. Damping and dry friction add ``-damping velocity`` and
+    `friction` to the tension. The effort of each joint is the coefficient times the tension. `armature` adds
     ``armature coefficient_i coefficient_j`` to the mass matrix. `force_range` bounds the sum of the forces of
     actuators. `name` may be empty.
     """

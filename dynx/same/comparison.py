@@ -113,7 +113,7 @@ def same_robot(
     and inertia that affects no motion may differ (`SameReport.freedoms`). The robots are the same if all else
     differs by at most `tolerance` of its scale: the reach of the robot for lengths, 1 rad for angles, the
     body's own inertia for inertias. dynx computes differences in 50 digits from the decimals of the files. If
-    the robots differ, the report has the fewest elements of `b` to replace, and `b` mended.
+    the robots differ, the report has the fewest elements of `b` to replace, and `b` with these replaced.
 
     Raises the errors of `dynx.load`; ArgumentError for a `tolerance` that is no number from 0 to below 1.
     """

@@ -114,13 +114,17 @@ class SameReport(_ReportFields):
     """Decision whether two descriptions describe the same robot, and what differs.
 
     `first` and `second` are the names that the caller gave, `first_source` and `second_source` the files or
-    texts that were read. `differences` are the fewest elements of the second description that make it the
-    same when replaced, `unmatched` what cannot be mended by replacing elements. `attributes` are other
-    differences, which do not change the verdict; `freedoms` are allowed differences, other ways to describe
-    the same motion. `bounds` hold for robots that are the same. `mended` is the second robot with the
-    differences removed; `mended_text` the bytes of its file, None where nothing is to be mended or
-    `not_mended` says why not. `T_first_second` (4, 4) is the pose of the second robot's base frame in the
-    first's, for floating bases.
+    texts that were read.
+
+    - `differences`: the fewest elements of the second description whose replacement makes the robots the same
+    - `unmatched`: joints that only one robot has, and the base if only one robot has a floating base
+    - `attributes`: other differences, which do not change the verdict
+    - `freedoms`: allowed differences, other ways to describe the same motion
+    - `bounds`: bounds on the differences of robots that are the same
+    - `mended`: the second robot with the elements replaced
+    - `mended_text`: the bytes of its file. None if the robots are the same, or if dynx cannot write the
+      file; `not_mended` then has the reason
+    - `T_first_second` (4, 4): for floating bases, the pose of the second robot's base frame in the first's
     """
 
     T_first_second: Floats | None

@@ -49,13 +49,15 @@ from dynx.spatial.scalar import Array, Floats
 class MomentumObserver(ModelEvaluation):
     """Observer that estimates the external torque (nv,) of a robot from q, v and the torque of its motors.
 
-    `residuals` is for a log, `update` for a loop. Between two samples the torque is constant, the other terms
-    are the mean of both samples, and the filter is exact for a constant external torque. So after a sudden
-    change of the external torque the error is below 1 % after 5 time constants, at any rate of samples.
-    `wrench` returns the wrench on a link that explains a residual best.
+    The estimate is called the residual. Use `residuals` for a log, and `update` in a loop. `wrench` returns
+    the wrench on a link that explains a residual best.
 
-    If the observer is an attribute of a controller of your own, the backend evaluates it, as with
-    `model_dynamics`. In compiled steps and batches compiled code evaluates it.
+    Between two samples the torque of the motors is constant, and the other terms are the mean of both
+    samples. For a constant external torque the filter is exact. So after a sudden change of the external
+    torque the error is below 1 % after 5 time constants, at any rate of samples.
+
+    Your own controller may have the observer as an attribute. The backend then evaluates the observer, as
+    with `model_dynamics`; in compiled steps and batches compiled code evaluates it.
     """
 
     model: Model
@@ -90,8 +92,8 @@ class MomentumObserver(ModelEvaluation):
         """`time_constant` [s] or `gain` [1/s], one number or one for each coordinate (nv,).
 
         `joint_damping`, `joint_friction`, `friction_slip`, `joint_armature` and `joint_springs` have the
-        meaning and the defaults of `dynx.simulate`, those of the description. What is left out counts as an
-        external torque, as does the friction of a joint at rest, which no observer can tell from a force.
+        meaning and the defaults of `dynx.simulate`. The observer counts effects that you leave out as an
+        external torque. The friction of a joint at rest also counts as an external torque.
 
         Raises GainError for coefficients, ArgumentError for a backend of another robot.
         """
@@ -196,8 +198,8 @@ class MomentumObserver(ModelEvaluation):
 
         It is the smallest w that minimises |J' w - residual|, where J is the Jacobian of the frame in this
         `reference`, at this `point` of the frame. For several frames, w has all their wrenches. With
-        `force_only` the moment at the point is zero, as at the point of a contact. Directions whose singular
-        values are below `tolerance` times the largest count as not observable: there w is zero (see
+        `force_only` the moment at the point is zero, as at the point of a contact. Directions with singular
+        values below `tolerance` times the largest count as not observable: w is zero in these directions (see
         `WrenchEstimate`).
         """
         frames = [frame] if isinstance(frame, str) else list(frame)

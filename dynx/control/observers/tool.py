@@ -112,8 +112,9 @@ class SensorMotion:
 
 @dataclass(frozen=True, eq=False)
 class Tool:
-    """Tool that a force-torque sensor carries, and the bias of the sensor: identified (`identify_tool`), or
-    made from known data by the first three arguments."""
+    """Tool that a force-torque sensor carries, and the bias of the sensor.
+
+    `identify_tool` returns a tool. If you know the data of the tool, give the first three arguments."""
 
     mass: float
     """Mass [kg]."""
@@ -171,12 +172,12 @@ def identify_tool(
     """Return the tool and the bias that explain readings (n, 6) best: force [N], then torque [N m].
 
     During the readings nothing may touch the tool. At rest, three orientations determine mass, centre and
-    bias, if the three vectors of gravity in the sensor's axes have tips that are not on one line.
-    `bias=False` assumes a bias of zero. With `inertia` the tensor is identified, too; the default is True if
-    the sensor rotates.
+    bias. The tips of the three vectors of gravity, in the sensor's axes, must not lie on one line.
+    `bias=False` assumes a bias of zero. With `inertia=True` the function also identifies the inertia tensor;
+    the default is True if the sensor rotates.
 
     Raises ArgumentError for readings that do not determine the tool (the error names the missing parameters),
-    and for a mass that is not positive (the readings have the opposite sign).
+    and for a mass that is not positive. A negative mass shows that the readings have the opposite sign.
     """
     rows = _checked_readings(readings, motion)
     tensor = not motion.rests if inertia is None else inertia

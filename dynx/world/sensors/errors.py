@@ -34,15 +34,15 @@ def _tuples(value: object) -> object:
 @checks_types
 @dataclass(frozen=True)
 class SensorErrors:
-    """Errors of one measured vector (m,), in its unit; each is one number or one for each component.
+    """Errors of one measured vector (m,), in its unit. Each error is one number, or one for each component.
 
     The reading of the true value x in sample k is
 
         saturated(rounded(x + scale x + cross_axis x + bias + walk[k] + deviation * normal[k]))
 
-    with normal numbers that are independent in time and between components, and walk[k + 1] - walk[k] of the
-    standard deviation ``random_walk * sqrt(T)``, walk[0] = 0, where T [s] is the period of the sensor. This
-    is the usual model of a gyroscope (IEEE Std 952, annex C; Woodman, An introduction to inertial navigation,
+    The normal numbers are independent in time and between components. walk[0] is 0, and walk[k + 1] - walk[k]
+    has the standard deviation ``random_walk * sqrt(T)``, where T [s] is the period of the sensor. This is the
+    usual model of a gyroscope (IEEE Std 952, annex C; Woodman, An introduction to inertial navigation,
     2007, section 3).
 
     Raises ArgumentError and its subclasses for numbers that are not finite, negative deviations, a resolution

@@ -56,12 +56,14 @@ class PlacedSensor(Sensor):
 class ForceTorqueSensor(PlacedSensor):
     """A sensor of the wrench that a joint transmits, ``force`` [N] and ``torque`` [N m].
 
-    It is the wrench that the parent exerts on the child, in the axes and about the origin of the sensor's
-    frame. So the sensor of an arm at rest reads a force upwards. `on` is a joint, fixed or moving, with
-    `pose` in the frame of its child link. Or `on` is a frame of the robot that lies on the child link of the
-    joint, with `pose` in this frame. On the root link of a robot with a fixed base it is the wrench of the
-    foundation. With ``weight=False`` the reading does not contain the weight of the links beyond the joint in
-    their present pose.
+    The parent link exerts this wrench on the child link. It is expressed in the axes of the sensor's frame,
+    about the origin of this frame. So the sensor of an arm at rest reads a force upwards. `on` names one of
+
+    - a joint, fixed or moving; `pose` is then in the frame of its child link
+    - a frame on the child link of a joint; `pose` is then in this frame
+    - the root link of a robot with a fixed base; the sensor then reads the wrench of the foundation
+
+    With ``weight=False`` the reading does not contain the weight of the links beyond the joint.
     """
 
     weight: bool = True
@@ -115,10 +117,10 @@ class ForceTorqueSensor(PlacedSensor):
 class Imu(PlacedSensor):
     """An inertial measurement unit: specific force ``acceleration`` [m/s^2] and ``angular_velocity`` [rad/s].
 
-    Both are of the sensor's frame, in its axes. `pose` is the pose of this frame in a frame of a robot or in
-    the frame of a body. The specific force is the acceleration of the frame's origin minus gravity. At rest
-    it is 9.81 m/s^2 upwards, in free fall 0 (Groves, Principles of GNSS, inertial and multisensor integrated
-    navigation systems, 2013, eq. 2.76).
+    Both quantities are those of the sensor's frame, in its axes. `pose` is the pose of this frame in the
+    frame `on` of a robot or body. The specific force is the acceleration of the frame's origin minus gravity:
+    at rest 9.81 m/s^2 upwards, in free fall 0 (Groves, Principles of GNSS, inertial and multisensor
+    integrated navigation systems, 2013, eq. 2.76).
     """
 
     accelerometer: SensorErrors = NO_ERRORS
@@ -153,11 +155,12 @@ class Imu(PlacedSensor):
 @checks_types
 @dataclass(frozen=True, kw_only=True)
 class JointTorqueSensor(Sensor):
-    """A sensor of the ``torque`` [N m], or the force [N], that a joint transmits along its axis to its child
-    link.
+    """A sensor of the ``torque`` that a joint transmits to its child link, along the axis of the joint: [N
+    m], or a force [N] for a prismatic joint.
 
-    It lies between the gear and the link. Its reading does not contain friction and armature of the joint,
-    which act between the motor and the gear. The torque of the motor is `Rollout.tau` and `World.torque`.
+    The sensor is between the gear and the link. Its reading does not contain friction and armature of the
+    joint, which act on the other side of the gear. The torque of the motor is `Rollout.tau` or
+    `World.torque`.
     """
 
     torque: SensorErrors = NO_ERRORS
@@ -183,8 +186,9 @@ class JointTorqueSensor(Sensor):
 @checks_types
 @dataclass(frozen=True, kw_only=True)
 class Encoder(Sensor):
-    """An encoder of a joint: ``position`` [rad or m] and ``velocity`` [rad/s or m/s]. On a mimic joint it
-    reads the mimic joint itself."""
+    """An encoder of a joint: ``position`` [rad or m] and ``velocity`` [rad/s or m/s].
+
+    On a mimic joint the encoder reads the mimic joint, not the joint that it follows."""
 
     position: SensorErrors = NO_ERRORS
     velocity: SensorErrors = NO_ERRORS
@@ -235,10 +239,11 @@ class ContactSensor(PlacedSensor):
 @checks_types
 @dataclass(frozen=True, kw_only=True)
 class RaySensor(PlacedSensor):
-    """A sensor of the ``distance`` [m] along the z axis of its frame to the first hit; without a hit within
-    `length` [m] it reads `length`.
+    """A sensor of the ``distance`` [m] to the first shape that a ray along the z axis of the sensor's frame
+    hits.
 
-    It is on a link or body, whose own shapes the ray passes through.
+    Without a hit within `length` [m] the sensor reads `length`. The sensor is on a link or body, and the ray
+    passes through the shapes of this link or body.
     """
 
     length: float = 10.0

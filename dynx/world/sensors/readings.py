@@ -50,7 +50,7 @@ class SensorReading:
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """m samples of a sensor; there are no readings between them."""
+    """m samples of a sensor."""
 
     sensor: Sensor
     t: Floats

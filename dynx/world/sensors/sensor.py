@@ -35,13 +35,13 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Sensor(ABC):
-    """A sensor `on` a part: ``robot/frame``, ``robot/joint`` or a body. In a simulation, and in a scene of
-    one robot, the name of the frame or joint suffices.
+    """A sensor. `on` names its place: ``robot/frame``, ``robot/joint`` or a body. In a simulation, and in a
+    scene of one robot, the name of the frame or joint suffices.
 
-    `rate` [Hz] is the number of samples per second; by default there is one sample in each step. A sample is
-    taken at the beginning of the first step at or after each multiple of ``1 / rate``, and can be read
-    `delay` [s] later. Its random numbers depend only on its `seed`, its name, the number of the rollout and
-    the number of the sample.
+    `rate` [Hz] is the number of samples per second; by default the sensor takes a sample in each step. For
+    each multiple of ``1 / rate``, it takes a sample at the beginning of the first step at or after this time.
+    A program can read the sample `delay` [s] later. The random numbers of the sensor depend only on its
+    `seed`, its name, the number of the rollout and the number of the sample.
     """
 
     name: str
