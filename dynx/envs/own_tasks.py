@@ -47,10 +47,11 @@ def refuse_irreproducible(
             place, reason = "", f"changes {traces.changed}, which a kernel would do once"
         else:
             continue
+        name = task.hook_names.get(hook, hook)
         raise ArgumentError(
-            f"{hook} of {type(task).__name__} {reason}; random numbers are the argument of start, as many as "
+            f"{name} of {type(task).__name__} {reason}; random numbers are the argument of start, as many as "
             "random_size says, and what changes during an episode is State.memory"
-            f" ({_shown_place(place or _definition(task, hook))})"
+            f" ({_shown_place(place or _definition(task, name))})"
         )
 
 
@@ -118,10 +119,11 @@ def _trace(evaluate: Callable[[UserTrace], Any]) -> UserTrace:
 
 def _variables(task: RobotTask) -> dict[str, Any]:
     """Return the attributes of a task and its classes, and variables of modules that its methods name."""
-    kind = type(task)
+    described = task.described
+    kind = type(described)
     own = {
         f"{kind.__name__}.{name}": value
-        for name, value in getattr(task, "__dict__", {}).items()
+        for name, value in getattr(described, "__dict__", {}).items()
         if not isinstance(getattr(kind, name, None), cached_property)
     }
     return variables_of(_own_classes(task)) | own
@@ -129,13 +131,13 @@ def _variables(task: RobotTask) -> dict[str, Any]:
 
 def _own_classes(task: RobotTask) -> list[type]:
     """Return the classes of a task that are the user's; one made by a call of `type` has the module abc."""
-    kinds = type(task).__mro__
+    kinds = type(task.described).__mro__
     return [each for each in kinds if is_foreign(each) or (each.__module__ == "abc" and each is not ABC)]
 
 
 def _definition(task: RobotTask, hook: str) -> str:
     """Return file and line of a hook, or the name of a class whose hook is no function of Python."""
-    code = getattr(getattr(type(task), hook), "__code__", None)
+    code = getattr(getattr(type(task.described), hook), "__code__", None)
     return type(task).__name__ if code is None else f"{code.co_filename}:{code.co_firstlineno}"
 
 

@@ -104,6 +104,9 @@ def read_distribution(name: str, given: Any, valid: str = NOT_NEGATIVE) -> Distr
 Ranges = Range | Mapping[str, Range]
 """One distribution for all parts, of which an episode draws one number; or one for each named part."""
 
+OF_ALL_PARTS = ("gain_scale", "motor_strength", "gravity_scale", "delay")
+"""Fields with one distribution, which no part has alone."""
+
 PAYLOAD_FIELDS = ("frame", "mass", "center")
 AXES = ("x", "y", "z")
 
@@ -133,6 +136,12 @@ class Randomization:
     """Dry friction of joints, by name [N m or N]."""
     friction_scale: Ranges | None = None
     """Factor on the coefficients of contact friction of links and bodies, by name; in worlds only."""
+    gain_scale: Range | None = None
+    """Factor on the gains of motors; in worlds only."""
+    motor_strength: Range | None = None
+    """Factor on the torques of motors and on their limits; in worlds only."""
+    gravity_scale: Range | None = None
+    """Factor on gravity; in worlds only."""
     delay: Range | None = None
     """Time from an action until it acts [s]."""
     observation_noise: Range | Mapping[int | str, Range] | None = None
@@ -177,7 +186,7 @@ class Randomization:
         if name == "payload":
             return _payload(given)
         valid = POSITIVE if name == "mass_scale" else NOT_NEGATIVE
-        if is_distribution(given) or name == "delay":
+        if is_distribution(given) or name in OF_ALL_PARTS:
             return {None: read_distribution(name, given, valid)}
         if not given:
             raise ArgumentError(f"{name} names no part; wanted a distribution, or one for each of some names")

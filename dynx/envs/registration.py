@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from dynx.argument_types import checks_types
 from dynx.envs.environment import TaskEnvironment
+from dynx.envs.ground_task import KERNEL_ENGINE, GroundTask
 from dynx.envs.library import AutoresetMode, register, registry
 from dynx.envs.randomization import Randomization
 from dynx.envs.task import RobotTask, Task
@@ -139,7 +140,7 @@ def make_environment(
 def make_vector_environment(
     task: str | type[Task],
     num_envs: int = 1,
-    engine: str = COMPILED,
+    engine: str | None = None,
     render_mode: str | None = None,
     *,
     max_episode_steps: int | None = None,
@@ -153,23 +154,28 @@ def make_vector_environment(
     joint_armature: bool = True,
     joint_springs: bool = True,
     joint_limits: bool = True,
+    threads: int | None = 1,
     **options: Any,
 ) -> RobotVectorEnvironment:
     """Return environments of a task that step in one compiled kernel; `gymnasium.make_vec` calls this.
 
-    Raises ArgumentError for another engine or a task that is no `RobotTask`: those step one by one or in
-    processes, by ``vectorization_mode="sync"`` or ``"async"``.
+    The engine is ``compiled`` for a `RobotTask`, ``dynx`` for a `GroundTask`. Raises ArgumentError for
+    another engine or another task: those step one by one or in processes, by ``vectorization_mode="sync"`` or
+    ``"async"``.
     """
     # Imported here, because single environments need no compiler.
     from dynx.envs.vector import RobotVectorEnvironment
 
     made = task_class(task).with_options(options)
-    if engine != COMPILED or not isinstance(made, RobotTask):
-        subject = type(made).__name__ if engine == COMPILED else f"engine {shown(engine)}"
+    wanted = kernel_engine(type(made))
+    if wanted is None or engine not in (None, wanted):
+        subject = type(made).__name__ if wanted is None else f"engine {shown(engine)}"
+        one = "of one robot" if wanted is None else "such as this one"
         raise ArgumentError(
             f"{subject} does not step in a compiled kernel; wanted vectorization_mode='sync' or 'async', or "
-            f"a task of one robot on engine {COMPILED!r}"
+            f"a task {one} on engine {wanted or COMPILED!r}"
         )
+    assert isinstance(made, RobotTask | GroundTask)
     return RobotVectorEnvironment(
         made,
         num_envs,
@@ -185,7 +191,15 @@ def make_vector_environment(
         joint_armature=joint_armature,
         joint_springs=joint_springs,
         joint_limits=joint_limits,
+        threads=threads,
     )
+
+
+def kernel_engine(kind: type[Task]) -> str | None:
+    """Return the engine on which tasks of a class step in compiled kernels; None for none."""
+    if issubclass(kind, GroundTask):
+        return KERNEL_ENGINE
+    return COMPILED if issubclass(kind, RobotTask) else None
 
 
 @checks_types
@@ -199,7 +213,7 @@ def register_task(env_id: str, task: str | type[Task]) -> None:
     register(
         env_id,
         entry_point=ENTRY_POINT,
-        vector_entry_point=VECTOR_ENTRY_POINT if issubclass(kind, RobotTask) else None,
+        vector_entry_point=VECTOR_ENTRY_POINT if kernel_engine(kind) else None,
         max_episode_steps=kind.max_episode_steps,
         reward_threshold=kind.reward_threshold,
         kwargs={"task": task},

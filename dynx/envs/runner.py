@@ -7,7 +7,7 @@ dynamics of a backend, or over `World.step`.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from types import SimpleNamespace
@@ -35,7 +35,7 @@ from dynx.envs.task import (
     WorldTask,
     free_move,
 )
-from dynx.envs.variation import VariedRobot, VariedScene
+from dynx.envs.variation import VariedGround, VariedRobot, VariedScene
 from dynx.errors import DivergedError, UnsupportedFeatureError
 from dynx.model.elements import JointCoefficients
 from dynx.model.numbers import DIVERGENCE_SPEED
@@ -44,6 +44,9 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.steppers.state import RobotState, WorldState
 
 if TYPE_CHECKING:
+    from dynx.envs.ground_step import GroundContacts
+    from dynx.envs.ground_task import GroundTask
+    from dynx.envs.task_step import TaskStep
     from dynx.world.scene import Scene
     from dynx.world.snapshot import Snapshot
     from dynx.world.world import World
@@ -195,10 +198,13 @@ class CompiledEpisodes(RobotEpisodes):
 
     def _open_lane(self) -> None:
         # Imported here, because other engines need no compiler.
-        from dynx.envs.task_step import TaskLanes, TaskStep
+        from dynx.envs.task_step import TaskStep
 
-        self._step = TaskStep(self._task, self._varied)
-        self._lanes = TaskLanes(self._step, 1)
+        self._use(TaskStep(self._task, self._varied))
+
+    def _use(self, step: TaskStep) -> None:
+        self._step = step
+        self._lanes = step.lanes(1)
         self._action = self._lanes.arrays["action"][0]
         self._shaped_action = self._action.reshape(self._task.action_space.shape)
         self._row: Floats = np.zeros(0)
@@ -246,6 +252,79 @@ class CompiledEpisodes(RobotEpisodes):
 
     def _shaped(self, observation: Floats) -> Array:
         return observation.astype(self._dtype).reshape(self._shape)
+
+
+def ground_episodes(task: GroundTask, engine: str, joints: JointOptions = DESCRIBED) -> Episodes:
+    """Return the episodes of a task on the ground: in a lane of the kernels of `dynx.envs.ground_step`, or in
+    a world where they do not have all that the task needs."""
+    # Imported here, because other engines need no compiler.
+    from dynx.envs.ground_step import GroundContacts
+
+    try:
+        contacts = GroundContacts.of(task, joints)
+    except UnsupportedFeatureError:
+        return WorldEpisodes(task, engine, joints)
+    return GroundEpisodes(task, contacts, joints)
+
+
+class GroundEpisodes(CompiledEpisodes):
+    """Episodes of a `GroundTask` in one lane of the kernels of its vectors of environments, with their
+    bits."""
+
+    def __init__(self, task: GroundTask, contacts: GroundContacts, joints: JointOptions = DESCRIBED) -> None:
+        """Raises UnsupportedFeatureError for a task that cannot be compiled."""
+        # Imported here, because other engines need no compiler.
+        from dynx.envs.ground_step import motion_of
+
+        self._ground, self._contacts = task, contacts
+        self._randomization: Randomization | None = None
+        self._motion = motion_of(task, contacts)
+        super().__init__(self._motion, COMPILED, joints)
+
+    def _open_lane(self) -> None:
+        from dynx.envs.ground_step import GroundStep
+
+        varied = VariedGround(self._motion, self._randomization, self._joints, self._contacts.surfaces)
+        self._varied = varied
+        self._use(GroundStep(self._motion, self._contacts, varied))
+
+    def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
+        """Return the parameters of this robot that episodes draw."""
+        self._randomization = randomization
+        self._open_lane()
+        return self._varied.drawn_parameters
+
+    @cached_property
+    def _world(self) -> World:
+        """A world that is only drawn."""
+        from dynx.world.world import World
+
+        return World(self._ground.scene(), "dynx")
+
+    def scene_and_state(self) -> tuple[Scene, WorldState]:
+        """Return the scene and its present state."""
+        world, state = self._world, self._state
+        (name,) = world.state.robots
+        world.set_state(robots={name: (state.q, state.v)})
+        return world.scene, world.state
+
+    def picture(self, width: int, height: int) -> NDArray[np.uint8]:
+        """Draw the scene by the task's camera."""
+        return _draw(self._ground, *self.scene_and_state(), width, height)
+
+    def view(self) -> None:
+        """Show the scene in the browser."""
+        self.scene_and_state()
+        if self._viewer is None:
+            self._viewer = self._world.view(steps=False)
+            print(f"{type(self._task).__name__} is shown at {self._viewer.url}", flush=True)
+        self._viewer.view.draw()
+
+    def close(self) -> None:
+        """Release engine and viewer. Closing twice is harmless."""
+        super().close()
+        if "_world" in self.__dict__:
+            self._world.close()
 
 
 class RobotVariation:
@@ -401,7 +480,8 @@ class WorldEpisodes(Episodes):
             acting = self._waiting.popleft()
             self._waiting.append(action)
             action = acting
-        self._world.step(**task.loads(episode, action))
+        loads = task.loads(episode, action)
+        self._world.step(**(loads if self._varied is None else self._varied.loads(loads, self._values)))
         task.settle(episode, action)
         self._action = action
         terminated = bool(task.terminated(episode))
@@ -411,11 +491,7 @@ class WorldEpisodes(Episodes):
 
     def picture(self, width: int, height: int) -> NDArray[np.uint8]:
         """Draw the world by the task's camera."""
-        # Imported here, because most environments draw no picture.
-        from dynx.world.camera import cast_rays_smoothly, draw_picture
-
-        camera = replace(self._task.camera, size=(width, height))
-        return draw_picture(self._world.scene, self._world.state, camera, cast_rays_smoothly).rgb
+        return _draw(self._task, *self.scene_and_state(), width, height)
 
     def scene_and_state(self) -> tuple[Scene, WorldState]:
         """Return the scene of the present episode, and its state."""
@@ -468,11 +544,30 @@ class WorldEpisodes(Episodes):
 
 def draw_robot(task: RobotTask, state: State, width: int, height: int) -> NDArray[np.uint8]:
     """Draw the robot (height, width, 3), seen by the camera of the task."""
+    return _draw(task, _scene_of_robot(task), _state_of_robot(state), width, height)
+
+
+def draw_on_ground(
+    task: GroundTask, states: Iterable[State], width: int, height: int
+) -> Iterator[NDArray[np.uint8]]:
+    """Draw the scene (height, width, 3) with the robot in each of some states, seen by the task's camera."""
+    # Imported here, because most environments draw no picture.
+    from dynx.world.world import World
+
+    with World(task.scene(), "dynx") as world:
+        (name,) = world.state.robots
+        for state in states:
+            world.set_state(robots={name: (state.q, state.v)})
+            yield _draw(task, world.scene, world.state, width, height)
+
+
+def _draw(
+    task: RobotTask | WorldTask, scene: Scene, state: WorldState, width: int, height: int
+) -> NDArray[np.uint8]:
     # Imported here, because most environments draw no picture.
     from dynx.world.camera import cast_rays_smoothly, draw_picture
 
-    camera = replace(task.camera, size=(width, height))
-    return draw_picture(_scene_of_robot(task), _state_of_robot(state), camera, cast_rays_smoothly).rgb
+    return draw_picture(scene, state, replace(task.camera, size=(width, height)), cast_rays_smoothly).rgb
 
 
 def _scene_of_robot(task: RobotTask) -> Scene:

@@ -254,6 +254,13 @@ class RobotTask(Task):
     """Name of the integration scheme: ``semi_implicit``, ``rk4`` or ``euler`` (explicit)."""
     random_size: ClassVar[int] = 0
     """Number of random numbers that `start` takes."""
+    hook_names: ClassVar[Mapping[str, str]] = {}
+    """Names of hooks in messages, where they are others than those of the methods."""
+
+    @property
+    def described(self) -> Task:
+        """The task that the user wrote."""
+        return self
 
     @property
     @abstractmethod
@@ -339,7 +346,7 @@ class RobotTask(Task):
 
     def open(self, engine: str, joints: JointOptions = DESCRIBED) -> Episodes:
         """Return the episodes of this task on a backend."""
-        return _opened("robot_episodes", self, engine, joints)
+        return opened("robot_episodes", self, engine, joints)
 
 
 Move = Callable[..., tuple[Array, Array]]
@@ -475,7 +482,7 @@ class WorldTask(Task):
 
     def open(self, engine: str, joints: JointOptions = DESCRIBED) -> Episodes:
         """Return the episodes of this task in a world of an engine."""
-        return _opened("WorldEpisodes", self, engine, joints)
+        return opened("WorldEpisodes", self, engine, joints)
 
 
 def checked_engine(kind: type[Task], engine: str | None) -> str:
@@ -509,7 +516,7 @@ def refuse_unphysical(name: str, value: object, unit: str, *, zero: bool = False
         raise ArgumentError(f"{name} is {shown(value)}; wanted a number {wanted} [{unit}]")
 
 
-def _opened(make: str, task: Task, engine: str, joints: JointOptions) -> Episodes:
+def opened(make: str, task: Task, engine: str, joints: JointOptions) -> Episodes:
     """Return the episodes of a task, made by `dynx.envs.runner`, which imports this module."""
     episodes: Episodes = getattr(import_module("dynx.envs.runner"), make)(task, engine, joints)
     return episodes

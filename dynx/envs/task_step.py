@@ -101,11 +101,7 @@ class TaskStep:
         self._varied = varied = VariedRobot(task, None) if varied is None else varied
         self._friction: JointFrictionText | None = None
         self._parametric: ParametricDynamics | None = None
-        if varied.parameters.names:
-            self._parametric = ParametricDynamics(varied.parameters)
-            if varied.parameters.joint_dynamics:
-                law = FrictionLaw.of(task.model, varied.dry_joints)
-                self._friction = JointFrictionText(task, law, self._parametric)
+        self._prepare_motion()
         self._starters: dict[int, TaskLanes] = {}
         self.layout = RowLayout.of(task)
         self._robot = ArrayDynamics(task.model)
@@ -118,6 +114,20 @@ class TaskStep:
             )
         self.observations = shape[0]
         self.actions = 1 if isinstance(space, spaces.Discrete) else math.prod(space.shape)
+
+    def _prepare_motion(self) -> None:
+        """Prepare the steps of the integrator."""
+        task, varied = self._task, self._varied
+        if varied.parameters.names:
+            self._parametric = ParametricDynamics(varied.parameters)
+            if varied.parameters.joint_dynamics:
+                law = FrictionLaw.of(task.model, varied.dry_joints)
+                self._friction = JointFrictionText(task, law, self._parametric)
+
+    def lanes(self, count: int, max_steps: int | None = None) -> TaskLanes:
+        """Return lanes of environments; `max_steps` is the number of steps after which an episode is
+        truncated."""
+        return TaskLanes(self, count, max_steps)
 
     @property
     def stops(self) -> bool:
@@ -160,11 +170,11 @@ class TaskStep:
         while size < n:
             size *= STARTED_AT_ONCE
         if size not in self._starters:
-            self._starters[size] = TaskLanes(self, size)
+            self._starters[size] = self.lanes(size)
         lanes = self._starters[size]
         lanes.arrays["random"][:n] = random
         lanes.now["steps"][...] = ENDED
-        lanes.evaluate()
+        lanes.evaluate_starts()
         self.refuse_not_finite(lanes.flags[:n])
         return lanes.end["state"][:n], lanes.arrays["observation"][:n]
 
@@ -205,6 +215,7 @@ class TaskStep:
                 sizes |= {"modes": self.modes, "one_by_one": 1}
             if isinstance(limits, StopsText):
                 sizes["released"] = limits.size * self._task.substeps
+            sizes |= self._sizes_of_motion()
 
         def traced(**inputs: Array) -> dict[str, Array]:
             given = {name: traced_array(array) for name, array in inputs.items()}
@@ -217,6 +228,10 @@ class TaskStep:
         purpose = "step" if start is None else "start"
         return StepText(traced, sizes, f"the {purpose} of {type(self._task).__name__} cannot be compiled")
 
+    def _sizes_of_motion(self) -> dict[str, int]:
+        """Return the sizes of further inputs of a step."""
+        return {}
+
     def _start(self, inputs: Mapping[str, Array], **options: Any) -> dict[str, Any]:
         state = hooks.start(self._task, inputs["random"], options)
         return {"state": self.layout.row(state), "observation": self._observation(state)}
@@ -228,18 +243,8 @@ class TaskStep:
         action, random, (count,), (limit,) = (inputs[each] for each in ("action", "random", "steps", "limit"))
         before, space = layout.state(inputs["state"]), task.action_space
         results: dict[str, Any] = {}
-        actions: list[Array] = [action] * task.substeps
-        move: Move = partial(free_move, task, robot.forward_dynamics)
-        drawn: Array = inputs.get("parameters", np.zeros(0))
-        move = self._move(drawn, inputs, move)
-        if limits is not None:
-            move = limits.moves(move, partial(self._mass_matrix, drawn), inputs)
-        if "earlier" in inputs:
-            actions, results["earlier"] = self._delayed(drawn, count, action, inputs["earlier"])
         overflow: list[Any] = []
-        moved = hooks.control_step(
-            task, robot, partial(_watched, move, overflow), before, [self._shaped(each) for each in actions]
-        )
+        moved = self._moved(inputs, before, results, overflow, limits)
         given = self._shaped(action)
         after = hooks.settle(task, moved)
         reward = hooks.number(task, "reward", task.reward(robot, before, given, after))
@@ -285,6 +290,29 @@ class TaskStep:
             "flags": [flags],
             **results,
         }
+
+    def _moved(
+        self,
+        inputs: Mapping[str, Array],
+        before: State,
+        results: dict[str, Any],
+        overflow: list[Any],
+        limits: LimitWatch | StopsText | None,
+    ) -> State:
+        """Return the state at the end of a control step; add further `results`, and the conditions that a
+        torque is not finite."""
+        task, robot, action = self._task, self._robot, inputs["action"]
+        actions: list[Array] = [action] * task.substeps
+        move: Move = partial(free_move, task, robot.forward_dynamics)
+        drawn: Array = inputs.get("parameters", np.zeros(0))
+        move = self._move(drawn, inputs, move)
+        if limits is not None:
+            move = limits.moves(move, partial(self._mass_matrix, drawn), inputs)
+        if "earlier" in inputs:
+            actions, results["earlier"] = self._delayed(drawn, inputs["steps"][0], action, inputs["earlier"])
+        return hooks.control_step(
+            task, robot, partial(_watched, move, overflow), before, [self._shaped(each) for each in actions]
+        )
 
     def _shaped(self, action: Array) -> Any:
         """Return an action (n,) as the task takes it."""
@@ -384,6 +412,9 @@ class TaskLanes:
     The state is read from one set of arrays and written to another, in turn.
     """
 
+    threads = 1
+    """Largest number of threads of an evaluation."""
+
     def __init__(self, step: TaskStep, count: int, max_steps: int | None = None) -> None:
         """`max_steps` is the number of steps after which an episode is truncated."""
         kernel, rows = step.kernel, max(count, host().lanes)
@@ -432,6 +463,10 @@ class TaskLanes:
             self._settle()
         if self._stops and self.flags.max() >= AT_LIMIT:
             self._stop(np.flatnonzero(self.flags >= AT_LIMIT))
+
+    def evaluate_starts(self) -> None:
+        """Evaluate a step of environments whose episodes have ended."""
+        self.evaluate()
 
     def accept(self) -> None:
         """Go on from the end of the step that was evaluated."""

@@ -7,9 +7,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,17 +19,21 @@ from dynx.errors import UnknownNameError, UnsupportedFeatureError, nearest, show
 from dynx.model import Model
 from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import JointCoefficients
+from dynx.model.mechanism import Mechanism
+from dynx.rbd.contact_step import ServoJoints
 from dynx.rbd.parameters import JOINT, POINT, SPRING, Parameters
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Array, Floats, sqrt
 from dynx.steppers.layout import stop_positions
 
 if TYPE_CHECKING:
     from dynx.steppers.material import Material
+    from dynx.world.motors import Motor
     from dynx.world.scene import Scene, SceneBody, SceneRobot
 
 ROBOT_FIELDS = ("mass_scale", "payload", "joint_damping", "joint_friction", "delay")
 JOINT_FIELDS = ("joint_damping", "joint_friction")
-SCENE_FIELDS = ("mass_scale", "payload", *JOINT_FIELDS, "friction_scale")
+MOTOR_FIELDS = ("gain_scale", "motor_strength")
+SCENE_FIELDS = ("mass_scale", "payload", *JOINT_FIELDS, "friction_scale", "gravity_scale")
 
 
 class VariedRobot:
@@ -39,6 +43,8 @@ class VariedRobot:
     `drawn_parameters`, in order.
     """
 
+    fields: ClassVar[tuple[str, ...]] = ROBOT_FIELDS
+
     def __init__(
         self, task: RobotTask, randomization: Randomization | None, joints: JointOptions = DESCRIBED
     ) -> None:
@@ -47,11 +53,8 @@ class VariedRobot:
         Raises UnknownNameError for a link, frame or joint that the robot does not have,
         UnsupportedFeatureError for a parameter of contacts.
         """
-        if randomization is not None and randomization.friction_scale is not None:
-            raise UnsupportedFeatureError(
-                f"{type(task).__name__} has no contacts, so friction_scale changes nothing; the friction of "
-                "its joints is joint_friction"
-            )
+        if randomization is not None:
+            self._refuse_other_fields(task, randomization)
         self._task, model = task, task.model
         refuse_ball_joints(model, "an environment of one robot")
         self.stops = joints.joint_limits and bool(np.isfinite(stop_positions(model)).any())
@@ -60,7 +63,7 @@ class VariedRobot:
         self.drawn_parameters: tuple[Parameter, ...] = (
             ()
             if randomization is None
-            else parameters_of(randomization, ROBOT_FIELDS, self._required, task.step_dt)
+            else parameters_of(randomization, self.fields, self._required, task.step_dt)
         )
         """Parameters that change the motion."""
         scales = self._columns("mass_scale")
@@ -94,6 +97,19 @@ class VariedRobot:
             np.round(bounds.get("delay", (0.0, 0.0))[1] / task.step_dt) / task.substeps
         )
         """Number of actions before the present one that may still act."""
+
+    def _refuse_other_fields(self, task: RobotTask, randomization: Randomization) -> None:
+        """Raise UnsupportedFeatureError for a parameter that the task does not have."""
+        if randomization.friction_scale is not None:
+            raise UnsupportedFeatureError(
+                f"{type(task).__name__} has no contacts, so friction_scale changes nothing; the friction of "
+                "its joints is joint_friction"
+            )
+        for field in (*MOTOR_FIELDS, "gravity_scale"):
+            if getattr(randomization, field) is not None:
+                raise UnsupportedFeatureError(
+                    f"{type(task).__name__} computes its torques itself: tasks in worlds have {field}"
+                )
 
     def _sources_of_joints(self, joints: JointOptions) -> list[int | float]:
         """Return the source of each coefficient of the joints, in the order of the parameters."""
@@ -150,6 +166,79 @@ class VariedRobot:
         return {each.part: k for k, each in enumerate(self.drawn_parameters) if each.field == field}
 
 
+class VariedGround(VariedRobot):
+    """The parameters of a robot with motors on the ground that episodes draw, in a kernel."""
+
+    fields = (*SCENE_FIELDS, *MOTOR_FIELDS)
+
+    def __init__(
+        self,
+        task: RobotTask,
+        randomization: Randomization | None,
+        joints: JointOptions = DESCRIBED,
+        surfaces: Sequence[tuple[str, str]] = (),
+    ) -> None:
+        """`surfaces` are link and ground of each contact."""
+        self._surfaces = surfaces
+        super().__init__(task, randomization, joints)
+        self.stops = False
+
+    def _refuse_other_fields(self, task: RobotTask, randomization: Randomization) -> None:
+        if randomization.delay is not None:
+            raise UnsupportedFeatureError(
+                f"kernels of {type(task).__name__} do not have delay; with vectorization_mode='sync' and "
+                "another engine each environment steps in a world, which has it"
+            )
+
+    def draws(self, *fields: str) -> bool:
+        """Check whether one of some parameters is drawn."""
+        return any(self._columns(field) for field in fields)
+
+    def joints(self, joints: ServoJoints, drawn: Array) -> ServoJoints:
+        """Return motors and joint dynamics with drawn values (k,)."""
+        gain, strength = (self._factor(field, drawn) for field in MOTOR_FIELDS)
+        if self.draws(*JOINT_FIELDS):
+            found = self.parameters.joints(self.values(drawn))
+            assert found is not None
+            base = len(found.damping) - len(joints.damping)
+            joints = replace(joints, damping=found.damping[base:], friction=found.friction[base:])
+        return replace(
+            joints,
+            kp=joints.kp * (gain * strength),
+            kd=joints.kd * (gain * strength),
+            max_torque=None if joints.max_torque is None else joints.max_torque * strength,
+        )
+
+    def friction(self, friction: float, surfaces: tuple[str, str], drawn: Array) -> Any:
+        """Return the coefficient of friction of a link and the ground with drawn values (k,)."""
+        columns = self._columns("friction_scale")
+        if not columns:
+            return friction
+        if None in columns:
+            return friction * drawn[columns[None]]
+        factors = [drawn[columns[each]] for each in surfaces if each in columns]
+        return friction * sqrt(math.prod(factors[1:], start=factors[0])) if factors else friction
+
+    def mechanism(self, mechanism: Mechanism, drawn: Array, *, masses: bool) -> Mechanism:
+        """Return the mechanism with drawn values (k,); with `masses` it is the remainder of `parameters`."""
+        if masses:
+            mechanism = self.parameters.mechanism(mechanism, self.values(drawn))
+        if self.draws("gravity_scale"):
+            mechanism = replace(mechanism, gravity=mechanism.gravity * self._factor("gravity_scale", drawn))
+        return mechanism
+
+    def _factor(self, field: str, drawn: Array) -> Any:
+        column = self._columns(field).get(None)
+        return 1.0 if column is None else drawn[column]
+
+    def _required(self, field: str, part: str) -> str:
+        own = part.rpartition("/")[2]
+        if field != "friction_scale":
+            return super()._required(field, own)
+        known = sorted({name for surfaces in self._surfaces for name in surfaces})
+        return require_name("part that touches", own, known)
+
+
 class VariedScene:
     """The parameters of a scene that episodes draw, and the scene with their values.
 
@@ -164,7 +253,7 @@ class VariedScene:
         frame = randomization.payload_frame
         self._payload = None if frame is None else self._full_name("frame", frame)
         self.parameters: tuple[Parameter, ...] = parameters_of(
-            randomization, (*SCENE_FIELDS, "delay"), self._required, control_dt
+            randomization, (*SCENE_FIELDS, *MOTOR_FIELDS, "delay"), self._required, control_dt
         )
         """Parameters that change the motion; a delay is rounded to whole control steps."""
         self.changes_scene = any(each.field in SCENE_FIELDS for each in self.parameters)
@@ -174,6 +263,20 @@ class VariedScene:
         """Return the number of control steps by which actions act later."""
         delays = [x for each, x in zip(self.parameters, values, strict=True) if each.field == "delay"]
         return round(float(delays[0]) / control_dt) if delays else 0
+
+    def loads(self, loads: Mapping[str, Any], values: Floats) -> Mapping[str, Any]:
+        """Return arguments of `World.step` whose motors have drawn values (k,) of the parameters."""
+        drawn = {each.field: float(x) for each, x in zip(self.parameters, values, strict=True)}
+        gain, strength = (drawn.get(field, 1.0) for field in MOTOR_FIELDS)
+        if "motors" not in loads or (gain, strength) == (1.0, 1.0):
+            return loads
+        motors = {
+            name: [
+                _scaled(each, gain, strength) for each in (given if isinstance(given, Sequence) else [given])
+            ]
+            for name, given in loads["motors"].items()
+        }
+        return {**loads, "motors": motors}
 
     def scene(self, scene: Scene, values: Floats) -> Scene:
         """Return a scene of the task with drawn values (k,) of the parameters."""
@@ -228,6 +331,7 @@ class VariedScene:
             scene,
             robots=tuple(map(of_robot, scene.robots)),
             bodies=tuple(map(of_body, scene.bodies)),
+            gravity=tuple(drawn.get(("gravity_scale", None), 1.0) * np.array(scene.gravity)),
         )
 
     def _required(self, field: str, part: str) -> str:
@@ -248,6 +352,19 @@ class VariedScene:
         if not part or name not in known:
             raise UnknownNameError(f"no {kind} {shown(name)}{nearest(name, [*known, *bodies])}")
         return name
+
+
+def _scaled(motor: Motor, gain: float, strength: float) -> Motor:
+    """Return a motor with gains times `gain`, whose torques and largest torque are then multiplied by
+    `strength`."""
+    factors = {"kp": gain * strength, "kd": gain * strength, "torque": strength, "max_force": strength}
+    given = {name: getattr(motor, name, None) for name in factors}
+    changed: dict[str, Any] = {
+        name: (factors[name] * np.asarray(value, dtype=np.float64)).tolist()
+        for name, value in given.items()
+        if value is not None
+    }
+    return replace(motor, **changed)
 
 
 def _parts(kind: str, model: Model) -> Sequence[str]:

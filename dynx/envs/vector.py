@@ -10,13 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from dynx.envs.environment import DIVERGED as DIVERGED_KEY
 from dynx.envs.environment import checked_action
+from dynx.envs.ground_step import GroundContacts, GroundStep, motion_of
+from dynx.envs.ground_task import GroundTask
 from dynx.envs.hooks import require_settings
 from dynx.envs.library import AutoresetMode, Space, VectorEnv, batch_space, spaces
 from dynx.envs.randomization import Randomization, Variation, first_seed
-from dynx.envs.runner import draw_robot
+from dynx.envs.runner import draw_on_ground, draw_robot
 from dynx.envs.task import JointOptions, RobotTask
-from dynx.envs.task_step import DIVERGED, INVALID, TaskLanes, TaskStep
-from dynx.envs.variation import VariedRobot
+from dynx.envs.task_step import DIVERGED, INVALID, TaskStep
+from dynx.envs.variation import VariedGround, VariedRobot
 from dynx.errors import (
     ArgumentError,
     ClosedError,
@@ -24,11 +26,13 @@ from dynx.errors import (
     DynxError,
     EpisodeError,
     ShapeError,
+    UnsupportedFeatureError,
     nearest,
     shown,
 )
 from dynx.model.numbers import DIVERGENCE_SPEED, checked_array, checked_seed, whole_number
 from dynx.simd.generators import Generators
+from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 
 RENDER_MODES = ("rgb_array",)
@@ -71,7 +75,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
 
     def __init__(
         self,
-        task: RobotTask,
+        task: RobotTask | GroundTask,
         num_envs: int = 1,
         *,
         max_episode_steps: int | None = None,
@@ -86,8 +90,10 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         joint_armature: bool = True,
         joint_springs: bool = True,
         joint_limits: bool = True,
+        threads: int | None = 1,
     ) -> None:
-        """Options are those of `TaskEnvironment`.
+        """Options are those of `TaskEnvironment`. Environments of a `GroundTask` step on at most `threads`
+        threads, by default on one; None stands for one per processor.
 
         Raises ArgumentError for an option that cannot be used, or a task with a hook that depends on more
         than its arguments, UnsupportedFeatureError for one that cannot be compiled.
@@ -115,11 +121,20 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         self._variation: Variation | None = None
         drawn = None if randomize is None else Randomization.read(randomize)
         joints = JointOptions(joint_damping, joint_friction, joint_armature, joint_springs, joint_limits)
-        varied = VariedRobot(task, drawn, joints)
+        self._task_step: TaskStep
+        varied: VariedRobot
+        if isinstance(task, GroundTask):
+            contacts = GroundContacts.of(task, joints)
+            motion = motion_of(task, contacts)
+            varied = VariedGround(motion, drawn, joints, contacts.surfaces)
+            self._task_step = GroundStep(motion, contacts, varied)
+        else:
+            varied = VariedRobot(task, drawn, joints)
+            self._task_step = TaskStep(task, varied)
+        self._threads = checked_threads(threads)
         if drawn is not None:
             spaces_of_one = task.observation_space, task.action_space
             self._variation = Variation(drawn, varied.drawn_parameters, *spaces_of_one, count=n)
-        self._task_step = TaskStep(task, varied)
         self._layout = self._task_step.layout
         self._seeded_by: np.random.Generator | None = None
         self._copy = copy
@@ -129,7 +144,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
     def _make_buffers(self, max_episode_steps: int | None) -> None:
         """Allocate the arrays of the kernel, and views of them for all environments."""
         n = self.num_envs
-        self._lanes = lanes = TaskLanes(self._task_step, n, max_episode_steps)
+        self._lanes = lanes = self._task_step.lanes(n, max_episode_steps)
+        lanes.threads = self._threads
         arrays = self._arrays = lanes.arrays
         self._random = arrays["random"][:n]
         self._generators = Generators(self._random)
@@ -168,6 +184,16 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         self._ended = NONE_ENDED
         if self._variation is not None:
             self._variation.restart()
+
+    @property
+    def contact_residuals(self) -> Floats:
+        """Largest violation of the laws of contact in the last step of each environment (num_envs,) [m/s].
+
+        Raises UnsupportedFeatureError for a task without contacts.
+        """
+        if "residual" not in self._arrays:
+            raise UnsupportedFeatureError(f"{type(self.task).__name__} has no contacts")
+        return np.array(self._arrays["residual"][: self.num_envs, 0])
 
     @property
     def parameters(self) -> dict[str, Floats]:
@@ -340,8 +366,10 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         if not self._running:
             raise EpisodeError("render was called before the first reset")
         width, height = self._size
-        rows = self.states
-        return tuple(draw_robot(self.task, self._layout.state(row), width, height) for row in rows)
+        states = map(self._layout.state, self.states)
+        if isinstance(self.task, GroundTask):
+            return tuple(draw_on_ground(self.task, states, width, height))
+        return tuple(draw_robot(self.task, state, width, height) for state in states)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Release the kernels."""

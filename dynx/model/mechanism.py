@@ -26,7 +26,7 @@ from dynx.argument_types import checks_types
 from dynx.model.elements import IDENTITY, JointSprings, Pose, Vector
 from dynx.model.tree import Tree
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
-from dynx.spatial.scalar import Array, Floats, sqrt
+from dynx.spatial.scalar import Array, Floats, equal, select, sqrt
 from dynx.spatial.so3 import rotate, rotation_about, rotation_from_quat, rotation_from_rpy
 
 ScalarConverter = Callable[[object], Array]
@@ -188,9 +188,11 @@ class Mechanism:
     def root_center(self) -> Array:
         """Centre of mass (3,) of a floating root in the base frame [m]; zero without mass or with a fixed
         base."""
-        if not self.floating or self.root.mass == 0.0:
+        if not self.floating:
             return np.zeros(3)
-        return np.asarray(self.root.first_moment / self.root.mass)
+        mass = np.asarray(self.root.mass)[()]  # may be a symbol
+        absent = equal(mass, 0.0)
+        return np.asarray(select(absent, 0.0, 1.0) * (self.root.first_moment / select(absent, 1.0, mass)))
 
     @property
     def nv(self) -> int:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from dynx.argument_types import checks_types
 from dynx.envs.environment import DIVERGED
+from dynx.envs.ground_task import KERNEL_ENGINE
 from dynx.envs.library import AutoresetMode, Env, GymnasiumError, VectorEnv, make_vec_env
-from dynx.envs.registration import is_of_dynx, specification
-from dynx.errors import ArgumentError, DynxError, shown
+from dynx.envs.registration import is_of_dynx, kernel_engine, task_class
+from dynx.errors import ArgumentError, DynxError, UnsupportedFeatureError, shown
 from dynx.model.numbers import whole_number
 from dynx.training.environments import first_line, make
 from dynx.training.library import (
@@ -35,15 +36,20 @@ MAX_ENVIRONMENTS = 10**6
 def make_vector(task: TaskSpec, envs: int, *, processes: bool = False) -> VecEnv:
     """Make `envs` environments of a task for an algorithm of stable-baselines3, ``PPO("MlpPolicy", vector)``.
 
-    On engine ``compiled`` all step in one compiled kernel, else one by one, or each in a process of its own
-    with `processes`. The return and length of each episode are in ``info["episode"]``. Raises ArgumentError
-    for a task that Gymnasium cannot make, and the errors of the task itself.
+    On engine ``compiled``, and on ``dynx`` where its kernels have all that the task needs, all step in
+    compiled kernels, else one by one, or each in a process of its own with `processes`. The return and length
+    of each episode are in ``info["episode"]``. Raises ArgumentError for a task that Gymnasium cannot make,
+    and the errors of the task itself.
     """
     count = whole_number("envs", envs, 1, MAX_ENVIRONMENTS)
     if processes:
         return VecMonitor(SubprocVecEnv([partial(_monitored, task) for _ in range(count)]))
     if _steps_in_a_kernel(task):
-        return VecMonitor(BatchedEnvironments(_make_batched(task, count)))
+        try:
+            return VecMonitor(BatchedEnvironments(_make_batched(task, count)))
+        except UnsupportedFeatureError:
+            if task.engine != KERNEL_ENGINE:
+                raise
     return DummyVecEnv([partial(_monitored, task) for _ in range(count)])
 
 
@@ -57,9 +63,7 @@ def make_training_vector(spec: TrainingSpec) -> VecEnv:
 
 
 def _steps_in_a_kernel(task: TaskSpec) -> bool:
-    known = specification(task.id)
-    in_kernel = known is not None and known.vector_entry_point is not None
-    return in_kernel and is_of_dynx(task.id) and task.engine == "compiled"
+    return is_of_dynx(task.id) and task.engine == kernel_engine(task_class(task.id))
 
 
 def _make_batched(task: TaskSpec, count: int) -> Any:

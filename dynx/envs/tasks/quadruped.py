@@ -8,28 +8,30 @@ standing posture, projected gravity, and a tracked velocity less what costs ener
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynx.envs.ground_task import GroundTask
 from dynx.envs.library import spaces
-from dynx.envs.task import Episode, WorldTask, camera_at, component_names
+from dynx.envs.task import State, camera_at, component_names, refuse_unknown_choice
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.numbers import is_real
-from dynx.model.rotations import quat_from_rpy
-from dynx.spatial.plain import Vector3, rotation_rows
-from dynx.spatial.scalar import Floats
-from dynx.world import Material, PositionMotor, Scene, SceneRobot, ground
+from dynx.spatial.scalar import Array
+from dynx.spatial.so3 import rotation_from_quat
+from dynx.world import Material, Scene, SceneRobot, ground
 
 if TYPE_CHECKING:
     from dynx.steppers.camera import Camera
 
 DOG, GROUND = "dog", "ground"
+FEET = ("FR_foot", "FL_foot", "RR_foot", "RL_foot")
+CONTACTS = ("all", "feet")
+"""Values of the option `contacts`."""
 START_HEIGHT, STAND_HEIGHT = 0.3, 0.29
 """Height [m] of the trunk in the posture, with the feet at the ground, and in the middle while it stands."""
 POSTURE = (0.0, 0.8, -1.6) * 4
@@ -50,7 +52,7 @@ SPEED_WIDTH = 0.25
 
 
 @dataclass(frozen=True)
-class Quadruped(WorldTask):
+class Quadruped(GroundTask):
     """A task of an A1 whose joints follow target angles.
 
     Action (12,): angles of the joints from the standing posture, in units of 0.4 rad. Observation (45,):
@@ -59,11 +61,21 @@ class Quadruped(WorldTask):
     clipped at 100. The episode terminates where the trunk falls.
     """
 
+    contacts: str = field(default="all", kw_only=True)
+    """Links that touch the ground: ``all``, or the ``feet`` alone."""
+
     control_dt = 0.02
     substeps = 5
     max_episode_steps = 500
     observation_size: ClassVar[int] = 45
     """Number of entries of the observation."""
+    kp = KP
+    kd = KD
+    max_torque = MAX_TORQUE
+    random_size = 34
+
+    def __post_init__(self) -> None:
+        refuse_unknown_choice("contacts", self.contacts, CONTACTS)
 
     @cached_property
     def model(self) -> Model:
@@ -98,39 +110,39 @@ class Quadruped(WorldTask):
         q = (0.0, 0.0, START_HEIGHT, 0.0, 0.0, 0.0, 1.0, *POSTURE)
         material = Material(friction=FRICTION)
         robot = SceneRobot(DOG, self.model, q=q, material=material)
-        return Scene("quadruped", (robot,), (ground(GROUND, material=material),))
+        passing = () if self.contacts == "all" else self.model.links
+        ignored = [(f"{DOG}/{link.name}", GROUND) for link in passing if link.name not in FEET]
+        return Scene("quadruped", (robot,), (ground(GROUND, material=material),), ignored=ignored)
 
-    def start_near_posture(self, episode: Episode, disturbance: float) -> None:
-        """Tilt, turn and push the trunk, and bend the legs, at random in proportion to `disturbance`.
+    def near_posture(self, random: Array, disturbance: float) -> State:
+        """Return a state whose trunk is tilted, turned and pushed, and whose legs are bent, in proportion to
+        `disturbance`, from numbers (34,) uniform in [0, 1). The memory has two actions of zero.
 
         Raises ArgumentError for a disturbance that is no number from 0 to `MAX_DISTURBANCE`.
         """
         self.require_disturbance(disturbance)
-        rng, memory = episode.rng, episode.memory
-        rpy = disturbance * rng.uniform(-0.1, 0.1, 3)
-        height = START_HEIGHT + disturbance * rng.uniform(0.03, 0.06)
-        joints = np.array(POSTURE) + disturbance * rng.uniform(-0.1, 0.1, len(POSTURE))
-        q = np.concatenate([[0.0, 0.0, height], quat_from_rpy(rpy), joints])
-        v = disturbance * rng.uniform(-0.3, 0.3, self.model.nv)
-        episode.world.set_state(robots={DOG: (q, v)})
-        memory.action = memory.action_before = np.zeros(len(POSTURE))
+        joints, nv = len(POSTURE), self.model.nv
+        rpy = disturbance * _between(-0.1, 0.1, random[:3])
+        height = START_HEIGHT + disturbance * _between(0.03, 0.06, random[3:4])
+        angles = np.array(POSTURE) + disturbance * _between(-0.1, 0.1, random[4 : 4 + joints])
+        q = np.concatenate([np.zeros(2), height, _quat_from_rpy(rpy), angles])
+        v = disturbance * _between(-0.3, 0.3, random[4 + joints : 4 + joints + nv])
+        return State(q, v, np.zeros(2 * joints))
 
-    def loads(self, episode: Episode, action: Any) -> Mapping[str, Any]:
-        """Return motors that hold the target angles."""
-        target = np.array(POSTURE) + ACTION_SCALE * np.asarray(action, dtype=np.float64)
-        return {"motors": {DOG: PositionMotor(target, kp=KP, kd=KD, max_force=MAX_TORQUE)}}
+    def targets(self, state: State, action: Array) -> Array:
+        """Return the target angles."""
+        return target_angles(action)
 
-    def settle(self, episode: Episode, action: Any) -> None:
-        """Keep the last two actions."""
-        memory = episode.memory
-        memory.action_before, memory.action = memory.action, np.asarray(action, dtype=np.float64)
+    def remember(self, state: State, action: Array) -> Array:
+        """Return the last two actions, and what follows them."""
+        n = len(POSTURE)
+        return np.concatenate([action, state.memory[:n], state.memory[2 * n :]])
 
-    def observation(self, episode: Episode) -> NDArray[np.float32]:
+    def observe(self, state: State) -> Array:
         """Return velocities and gravity in the axes of the trunk, joints, and the last action."""
-        q, v = episode.world.state.robots[DOG]
-        down = [-x for x in vertical_axis(q)]
-        parts = [v[:6], down, q[7:] - POSTURE, v[6:], episode.memory.action]
-        return np.concatenate(parts).clip(-LARGEST, LARGEST).astype(np.float32)
+        q, v, memory = state
+        parts = [v[:6], -vertical_axis(q), q[7:] - np.array(POSTURE), v[6:], memory[: len(POSTURE)]]
+        return np.asanyarray(np.minimum(np.maximum(np.concatenate(parts), -LARGEST), LARGEST))
 
     def require_disturbance(self, disturbance: float) -> None:
         """Raise ArgumentError for a disturbance that is no number from 0 to `MAX_DISTURBANCE`."""
@@ -139,19 +151,20 @@ class Quadruped(WorldTask):
                 f"disturbance is {shown(disturbance)}; wanted a number from 0 to {MAX_DISTURBANCE:g}"
             )
 
-    def costs(self, episode: Episode) -> float:
+    def costs(self, state: State) -> Any:
         """Return the costs of motor power [W] and of changes of the action."""
-        memory = episode.memory
-        q, v = episode.world.state.robots[DOG]
-        target = np.array(POSTURE) + ACTION_SCALE * memory.action
-        torque = np.clip(KP * (target - q[7:]) - KD * v[6:], -MAX_TORQUE, MAX_TORQUE)
-        change = memory.action - memory.action_before
-        return float(2e-4 * np.abs(torque * v[6:]).sum() + 0.01 * change @ change)
+        q, v, memory = state
+        n = len(POSTURE)
+        action, action_before = memory[:n], memory[n : 2 * n]
+        torque = KP * (target_angles(action) - q[7:]) - KD * v[6:]
+        torque = np.minimum(np.maximum(torque, -MAX_TORQUE), MAX_TORQUE)
+        change = action - action_before
+        return 2e-4 * np.sum(np.abs(torque * v[6:])) + 0.01 * np.sum(change * change)
 
-    def terminated(self, episode: Episode) -> bool:
+    def is_over(self, state: State) -> Any:
         """Check whether the trunk is too low, or leans too far."""
-        q = episode.world.state.robots[DOG].q
-        return bool(q[2] < LEAST_HEIGHT or vertical_axis(q)[2] < LEAST_UPRIGHT)
+        q = state.q
+        return (q[2] < LEAST_HEIGHT) | (vertical_axis(q)[2] < LEAST_UPRIGHT)
 
     @cached_property
     def camera(self) -> Camera:
@@ -159,11 +172,34 @@ class Quadruped(WorldTask):
         return camera_at((1.2, -1.6, 0.8), (0.0, 0.0, 0.25))
 
 
-def vertical_axis(q: Floats) -> Vector3:
+def target_angles(action: Array) -> Array:
+    """Return the angles (12,) of an action."""
+    return np.array(POSTURE) + ACTION_SCALE * action
+
+
+def vertical_axis(q: Array) -> Array:
     """Return the upward vertical (3,) in the axes of the trunk."""
-    return rotation_rows(*q[3:7].tolist())[2]
+    return np.asanyarray(rotation_from_quat(q[3:7])[2])
 
 
-def with_floor(terms: Mapping[str, float]) -> dict[str, float]:
+def with_floor(terms: Mapping[str, Any]) -> dict[str, Any]:
     """Return the terms of a reward that is not below zero, with that which adds to a negative sum."""
-    return {**terms, "floor at zero": max(-sum(terms.values()), 0.0)}
+    return {**terms, "floor at zero": np.maximum(-sum(terms.values()), 0.0)}
+
+
+def _between(low: float, high: float, random: Array) -> Array:
+    """Return numbers uniform in an interval, from those in [0, 1)."""
+    return low + (high - low) * random
+
+
+def _quat_from_rpy(rpy: Array) -> Array:
+    """Return the quaternion (4,) of roll, pitch and yaw."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(0.5 * rpy), np.cos(0.5 * rpy)
+    return np.array(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ]
+    )

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dynx.envs.task import Episode
-from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, STAND_HEIGHT, Quadruped, vertical_axis, with_floor
+from dynx.envs.task import State
+from dynx.envs.tasks.quadruped import SPEED_WIDTH, STAND_HEIGHT, Quadruped, vertical_axis, with_floor
+from dynx.spatial.scalar import Array
 
 
 @dataclass(frozen=True)
@@ -25,29 +26,23 @@ class Stand(Quadruped):
     """Size of the disturbance at the start. From 1 the posture recovers by itself, without a policy."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.require_disturbance(self.disturbance)
 
-    def start(self, episode: Episode, disturbance: float | None = None) -> None:
-        """Start near the posture, at random in proportion to `disturbance`, by default that of the task."""
-        self.start_near_posture(episode, self.disturbance if disturbance is None else disturbance)
+    def initial_state(self, random: Array, disturbance: float | None = None) -> State:
+        """Return a state near the posture, at random in proportion to `disturbance`, by default that of the
+        task."""
+        return self.near_posture(random, self.disturbance if disturbance is None else disturbance)
 
-    def reward(self, episode: Episode, action: Any) -> float:
-        """Return the reward for standing, less the costs of the motion."""
-        q, v = episode.world.state.robots[DOG]
-        upright = vertical_axis(q)[2]
-        high = float(np.exp(-((q[2] - STAND_HEIGHT) ** 2) / 0.01))
-        still = float(np.exp(-(v[:6] @ v[:6]) / SPEED_WIDTH))
-        return max(upright * high * (0.5 + 0.5 * still) - self.costs(episode), 0.0)
-
-    def reward_terms(self, episode: Episode, action: Any) -> Mapping[str, float]:
+    def terms(self, before: State, action: Array, after: State) -> Mapping[str, Any]:
         """Return the terms of the posture and the costs, and what makes a negative sum zero."""
-        q, v = episode.world.state.robots[DOG]
-        posture = float(vertical_axis(q)[2] * np.exp(-((q[2] - STAND_HEIGHT) ** 2) / 0.01))
-        still = float(np.exp(-(v[:6] @ v[:6]) / SPEED_WIDTH))
+        q, v, _ = after
+        posture = vertical_axis(q)[2] * np.exp(-((q[2] - STAND_HEIGHT) ** 2) / 0.01)
+        still = np.exp(-np.sum(v[:6] * v[:6]) / SPEED_WIDTH)
         return with_floor(
             {
                 "upright and high": 0.5 * posture,
                 "at rest": 0.5 * posture * still,
-                "power and jerks": -self.costs(episode),
+                "power and jerks": -self.costs(after),
             }
         )

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynx.envs.task import Episode, component_names
-from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, Quadruped, vertical_axis, with_floor
+from dynx.envs.task import State, component_names
+from dynx.envs.tasks.quadruped import POSTURE, SPEED_WIDTH, Quadruped, vertical_axis, with_floor
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import MAX_MAGNITUDE, is_real
-from dynx.spatial.scalar import Floats
+from dynx.spatial.scalar import Array, Floats
+
+WANTED = slice(2 * len(POSTURE), None)
+"""Entries of the memory with the wanted velocity."""
 
 
 @dataclass(frozen=True)
@@ -33,61 +35,56 @@ class Walk(Quadruped):
     """Largest wanted yaw rate [rad/s]."""
 
     observation_size: ClassVar[int] = 48
+    random_size = 37
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("max_speed", "max_yaw_rate"):
             number = getattr(self, name)
             if not is_real(number) or not 0.0 <= number < MAX_MAGNITUDE:
                 raise ArgumentError(f"{name} is {shown(number)}; wanted a number of at least 0")
 
-    def start(
-        self, episode: Episode, disturbance: float = 0.2, velocity: tuple[float, float, float] | None = None
-    ) -> None:
-        """Start near the posture, and draw the wanted velocity unless it is given."""
-        self.start_near_posture(episode, disturbance)
-        largest = (self.max_speed, 0.5 * self.max_speed, self.max_yaw_rate)
-        drawn = episode.rng.uniform(-1.0, 1.0, 3) * largest
-        episode.memory.velocity = checked_velocity(drawn if velocity is None else velocity)
+    def initial_state(
+        self, random: Array, disturbance: float = 0.2, velocity: tuple[float, float, float] | None = None
+    ) -> State:
+        """Return a state near the posture, with the wanted velocity, which is drawn unless it is given."""
+        first = self.near_posture(random, disturbance)
+        largest = np.array([self.max_speed, 0.5 * self.max_speed, self.max_yaw_rate])
+        wanted = (2.0 * random[-3:] - 1.0) * largest if velocity is None else checked_velocity(velocity)
+        return first._replace(memory=np.concatenate([first.memory, wanted]))
 
     @property
     def observation_names(self) -> tuple[str, ...]:
         """Names of the entries of the observation."""
         return (*super().observation_names, *component_names("wanted velocity", ("x", "y", "yaw")))
 
-    def observation(self, episode: Episode) -> NDArray[np.float32]:
+    def observe(self, state: State) -> Array:
         """Return the observation of `Quadruped`, and the wanted velocity."""
-        return np.concatenate([super().observation(episode), episode.memory.velocity.astype(np.float32)])
+        return np.concatenate([super().observe(state), state.memory[WANTED]])
 
-    def reward(self, episode: Episode, action: Any) -> float:
-        """Return the reward for the velocity, less the costs of the motion."""
-        q, v = episode.world.state.robots[DOG]
-        error, turning = v[:2] - episode.memory.velocity[:2], v[5] - episode.memory.velocity[2]
-        leaning_x, leaning_y, _ = vertical_axis(q)
-        tracking = np.exp(-(error @ error) / SPEED_WIDTH) + 0.5 * np.exp(-(turning**2) / SPEED_WIDTH)
-        shaking = 2.0 * v[2] ** 2 + 0.05 * (v[3:5] @ v[3:5]) + 0.5 * (leaning_x**2 + leaning_y**2)
-        # Were rewards negative, a policy that does not walk yet would earn more by falling, which ends them.
-        return max(float(tracking - shaking) - self.costs(episode), 0.0)
+    def terms(self, before: State, action: Array, after: State) -> Mapping[str, Any]:
+        """Return the terms of the velocity and the costs, and what makes a negative sum zero.
 
-    def reward_terms(self, episode: Episode, action: Any) -> Mapping[str, float]:
-        """Return the terms of the velocity and the costs, and what makes a negative sum zero."""
-        q, v = episode.world.state.robots[DOG]
-        wanted = episode.memory.velocity
+        Were rewards negative, a policy that does not walk yet would earn more by falling, which ends them.
+        """
+        q, v, memory = after
+        wanted = memory[WANTED]
         leaning_x, leaning_y, _ = vertical_axis(q)
-        error = v[:2] - wanted[:2]
+        error, turning = v[:2] - wanted[:2], v[5] - wanted[2]
         return with_floor(
             {
-                "speed": float(np.exp(-(error @ error) / SPEED_WIDTH)),
-                "yaw rate": 0.5 * float(np.exp(-((v[5] - wanted[2]) ** 2) / SPEED_WIDTH)),
-                "bouncing": -2.0 * float(v[2] ** 2),
-                "rolling and pitching": -0.05 * float(v[3:5] @ v[3:5]),
-                "leaning": -0.5 * float(leaning_x**2 + leaning_y**2),
-                "power and jerks": -self.costs(episode),
+                "speed": np.exp(-np.sum(error * error) / SPEED_WIDTH),
+                "yaw rate": 0.5 * np.exp(-(turning**2) / SPEED_WIDTH),
+                "bouncing": -2.0 * v[2] ** 2,
+                "rolling and pitching": -0.05 * np.sum(v[3:5] * v[3:5]),
+                "leaning": -0.5 * (leaning_x**2 + leaning_y**2),
+                "power and jerks": -self.costs(after),
             }
         )
 
-    def info(self, episode: Episode) -> dict[str, Any]:
+    def describe(self, state: State) -> dict[str, Any]:
         """Return the wanted ``velocity`` (3,)."""
-        return {"velocity": episode.memory.velocity.copy()}
+        return {"velocity": np.array(state.memory[WANTED], dtype=np.float64)}
 
 
 def checked_velocity(velocity: Any) -> Floats:
