@@ -34,7 +34,7 @@ EXAMPLES_INSTALLED = any(entry.source == EXAMPLE_ROBOT_DATA for entry in robots(
 needs_examples = pytest.mark.skipif(not EXAMPLES_INSTALLED, reason="needs example-robot-data")
 
 # Reading the entry points of all packages takes tens of milliseconds; none is installed during the tests.
-registry.entry_points = cache(entry_points)  # type: ignore[assignment]
+registry.entry_points = cache(entry_points)  # type: ignore[assignment, attr-defined]
 
 settings.register_profile(
     "ci",
