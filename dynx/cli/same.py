@@ -82,7 +82,7 @@ def same(
     else:
         out = console()
         show(out, document)
-        if fix is not None and report.same:
+        if fix is not None and report.same and report.mended_text is None:
             kept = " (other differences are not mended)" if report.attributes else ""
             out.print(f"nothing to mend{kept}: {one_line(fix)} is not written")
         if known is not None:
@@ -171,8 +171,8 @@ def _check_suffix(path: str, second: str) -> None:
 
 
 def _write_mended(report: SameReport, path: str) -> None:
-    """Write the mended file; there is none where the robots are the same."""
-    if report.same:
+    """Write the mended file; there is none where nothing that can be mended differs."""
+    if report.mended_text is None and report.same:
         return
     if report.mended_text is None:
         raise ArgumentError(f"{shown(path, 300)} is not written: {report.not_mended}")
@@ -244,6 +244,12 @@ def _show_attributes(out: Console, attributes: Sequence[Entry]) -> None:
         )
     out.print("")
     out.print(table)
+    effects = [(each, effect) for each in attributes for effect in each["effects"] if effect["size"]]
+    for each, effect in effects[:MAX_ROWS]:
+        name = one_line(each["theirs"])
+        size = f"{_size(effect['size'])} {effect['unit']}"
+        out.print(f"{each['kind']} {name}: {effect['quantity']} changes by up to {size}")
+    print_rest(out, len(effects) - MAX_ROWS)
 
 
 def _show_freedoms(out: Console, freedoms: Sequence[Entry]) -> None:

@@ -20,7 +20,7 @@ plus that of further impulses, without friction, which end a part of each overla
 
 **Sweeps** (projected Gauss-Seidel) visit one set after the other: x becomes the point of the set closest to
 x - w / g, with the largest eigenvalue g of the set's block of G. A fixed point is a solution. One sweep is
-text for any scalar; `frozen_sweep` stops where the largest change is small, each lane of a kernel for itself.
+text for any scalar; kernels have sweeps of their own (`dynx.rbd.block_sweeps`), with the same law.
 Sweeps converge linearly, and slowly where a heavy body rests on a light one.
 
 **Newton's method** ends what sweeps begin, on floats: the conditions above are equations F(x) = 0 with
@@ -200,29 +200,6 @@ def sweep(
             for row, each in zip(rows, wanted, strict=True):
                 apply(row, share * each)
     return np.array(x, dtype=w.dtype), w, change
-
-
-def frozen_sweep(
-    sets: ConstraintSets,
-    G: Array,
-    g: Sequence[Any],
-    limits: Sequence[Any] | Array,
-    floors: Sequence[Any] | Array,
-    state: tuple[Array, Array, Any],
-    tolerance: Any,
-) -> tuple[Array, Array, Any]:
-    """Visit every set once if the last change of `state` was above the tolerance; otherwise return `state`.
-
-    The state is what `sweep` returns; its change is infinite at first. Without a branch, so that a lane of a
-    kernel that has finished keeps its bits whatever its neighbours do.
-    """
-    goes_on = less(tolerance, state[2])
-    swept = sweep(sets, G, g, limits, floors, state[0], state[1])
-    x, w = (
-        np.array([select(goes_on, a, b) for a, b in zip(new, old, strict=True)], dtype=new.dtype)
-        for new, old in zip(swept[:2], state[:2], strict=True)
-    )
-    return x, w, select(goes_on, swept[2], state[2])
 
 
 def residuals(

@@ -55,8 +55,21 @@ Tag = Literal["joint", "link", "robot", "actuator", "sensor", "tendon", "equalit
 
 
 @dataclass(frozen=True)
+class StatedEffect:
+    """Largest change of a quantity over random states, or at a configuration, with its unit."""
+
+    quantity: str
+    size: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Attribute:
-    """A difference beside the verdict, with the values in both descriptions and their lines."""
+    """A difference beside the verdict, with the values in both descriptions and their lines.
+
+    `effects` are those of a tendon, constraint or configuration that both have: what of it changes by how
+    much if it is as in the second description.
+    """
 
     kind: Kind
     tag: Tag
@@ -69,6 +82,7 @@ class Attribute:
     first_file: str | None = None
     second_file: str | None = None
     """Files of the lines, where another file includes them."""
+    effects: tuple[StatedEffect, ...] = ()
 
     def __post_init__(self) -> None:
         name_files_of_lines(self)

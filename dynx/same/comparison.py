@@ -39,10 +39,11 @@ from dynx.same.elements import (
     are_equal,
 )
 from dynx.same.fit import Fit
-from dynx.same.mending import NotMendedError, mended_text
+from dynx.same.mending import NotMendedError, mended_text, with_stated_parts
 from dynx.same.report import Coordinate, ElementDifference, SameReport, Unmatched
 from dynx.same.sensors import sensor_differences
 from dynx.same.skeleton import Skeleton, exact_skeleton, without_standing_mimics
+from dynx.same.stated_parts import StatedChange, StatedParts, changed_model, effects_of
 from dynx.same.text import inertial_text, pose_text, vector_text
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
@@ -54,6 +55,12 @@ TOLERANCE = 1e-9
 
 MAX_EFFECTS = 64
 """Largest number of differences of which effects are measured."""
+
+
+MAX_SINGLE_CHANGES = 16
+"""Largest number of tendons, constraints and keyframes that are mended one by one where all at once fail."""
+
+UNMENDED_PARTS = "tendons, constraints and keyframes are not mended"
 
 
 @dataclass(frozen=True)
@@ -136,19 +143,27 @@ def same_robot(
     analysis = analyse(skeleton, theirs, tolerance)
     unmatched += _unmatched(analysis.fit)
     same = analysis.equal and not unmatched
+    least = max(tolerance, 1e-15)
+    with fifty_digits():
+        stated = [*StatedParts(first.model, second.model, analysis.fit, least).changes()]
+    changes = [each for each in stated if isinstance(each, StatedChange)]
+    notes += [each for each in stated if isinstance(each, str)]
     mended, text, reason = None, None, None
     if not same:
         mended, text, reason = _mended(second, skeleton, theirs, analysis, unmatched, tolerance)
+    if changes and reason is None:
+        mended, text, left = _with_stated_parts(first, second, skeleton, mended, text, changes, tolerance)
+        notes += left
     differences = _differences(analysis, first, second)
     with fifty_digits():
-        apart = list(attributes(first.model, second.model, analysis.fit, max(tolerance, 1e-15)))
-        frames = list(frame_differences(ours, theirs, analysis.fit, max(tolerance, 1e-15)))
+        apart = list(attributes(first.model, second.model, analysis.fit, least))
+        frames = list(frame_differences(ours, theirs, analysis.fit, least))
         free = [each for each in frames if isinstance(each, DescriptionFreedom)]
         apart += [each for each in frames if isinstance(each, Attribute)]
-        contacts = [*contact_differences(first.model, second.model, analysis.fit, max(tolerance, 1e-15))]
+        contacts = [*contact_differences(first.model, second.model, analysis.fit, least)]
         apart += [each for each in contacts if isinstance(each, Attribute)]
-        apart += actuator_differences(first.model, second.model, analysis.fit, max(tolerance, 1e-15))
-        both, least = (first.model, second.model, analysis.fit), max(tolerance, 1e-15)
+        apart += actuator_differences(first.model, second.model, analysis.fit, least)
+        both = first.model, second.model, analysis.fit
         apart += sensor_differences(*both, least)
         apart += tendon_differences(*both, least)
         constraints = [*equality_differences(*both, least)]
@@ -156,6 +171,7 @@ def same_robot(
         free += [each for each in constraints if isinstance(each, DescriptionFreedom)]
         apart += compensation_differences(*both, least)
         apart += configuration_differences(*both, least)
+        apart = [_with_effects(each, changes, second.model) for each in apart]
         free += [each for each in contacts if isinstance(each, DescriptionFreedom)]
         free += [*freedoms(analysis.fit, tolerance), *_unseen(analysis)]
         limits = bounds(analysis.fit, _unseen_bodies(analysis)) if same else None
@@ -419,3 +435,75 @@ def _mended(
     if not are_equal(ours, again, analysis.fit, tolerance):
         return mended, None, "the mended text is not read as the same robot"
     return mended, source.to_bytes(), None
+
+
+def _with_stated_parts(
+    first: _Loaded,
+    second: _Loaded,
+    ours: Skeleton,
+    mended: Model | None,
+    text: bytes | None,
+    changes: list[StatedChange],
+    tolerance: float,
+) -> tuple[Model | None, bytes | None, list[str]]:
+    """Return the second robot and its text with the tendons, constraints and keyframes of the first, and
+    notes on those that are not mended."""
+    model = changed_model(second.model if mended is None else mended, changes)
+    if second.data is None:
+        return model, model.to_mjcf().encode(), []
+    left: list[str] = []
+    while changes:
+        try:
+            # The lines are those of the file: its elements are replaced last.
+            source = with_stated_parts(second.source, model, changes)
+            if mended is not None:
+                source = mended_text(source, second.model, mended)
+            again = read_model(source.to_bytes(), second.model.source, None, base=None)
+        except (NotMendedError, DynxError) as error:
+            if len(changes) == 1:
+                return mended, text, [*left, f"{changes[0].words} is not mended: {error}"]
+            if len(changes) > MAX_SINGLE_CHANGES:
+                return mended, text, [*left, f"{UNMENDED_PARTS}: {error}"]
+            failed = [
+                _with_stated_parts(first, second, ours, mended, text, [each], tolerance)[2]
+                for each in changes
+            ]
+            left += [note for notes in failed for note in notes]
+            remaining = [each for each, notes in zip(changes, failed, strict=True) if not notes]
+            if len(remaining) == len(changes):
+                return mended, text, [*left, f"{UNMENDED_PARTS}: {error}"]
+            changes = remaining
+            model = changed_model(second.model if mended is None else mended, changes)
+            continue
+        again = again.with_base(second.model.base)
+        found = analyse(ours, without_standing_mimics(again), tolerance)
+        with fifty_digits():
+            rest = StatedParts(first.model, again, found.fit, max(tolerance, 1e-15)).changes()
+            names = {each.words for each in rest if isinstance(each, StatedChange)}
+        wrong = [each for each in changes if each.words in names]
+        if not wrong and found.equal:
+            return model, source.to_bytes(), left
+        if not wrong:
+            return (
+                mended,
+                text,
+                [*left, "tendons, constraints and keyframes are not mended: they change the robot"],
+            )
+        left += [f"{each.words} is not mended: its text is not read as that of the first" for each in wrong]
+        changes = [each for each in changes if each not in wrong]
+        model = changed_model(second.model if mended is None else mended, changes)
+    return mended, text, left
+
+
+def _with_effects(attribute: Attribute, changes: list[StatedChange], theirs: Model) -> Attribute:
+    """Return an attribute with the effects of its part of the second robot."""
+    if attribute.ours is None or attribute.theirs is None:
+        return attribute
+    sections = {"tendon": "tendon", "equality": "equality", "configuration": "keyframe"}
+    for each in changes:
+        old = each.old
+        if old is None or sections.get(attribute.kind) != each.section or old.line != attribute.second_line:
+            continue
+        if old.name in ("", attribute.theirs):
+            return replace(attribute, effects=effects_of(each, theirs))
+    return attribute

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dynx.model import Model
-from dynx.model.elements import Pose
+from dynx.model.elements import NamedConfiguration, Pose
 from dynx.same.attributes import Attribute, Kind, listed, number_text
 from dynx.same.decimals import rounded
 from dynx.same.fit import Fit
@@ -38,66 +38,11 @@ def configuration_differences(
 ) -> Iterator[Attribute]:
     """Yield the named configurations that differ, that one description has alone, or that have other names;
     nothing where a description leaves them open. Joints without counterpart are not compared."""
-    if ours.stated_configurations is None or theirs.stated_configurations is None:
-        return
-    joints = [
-        (each, found.ours.joints[each.ours].name, found.theirs.joints[each.theirs].name)
-        for each in found.bodies[1:]
-    ]
-    joints = [row for row in joints if row[1] in ours.joint_names and row[2] in theirs.joint_names]
-    balls = [row for row in joints if row[0].before is not None]
-    joints = [row for row in joints if row[0].before is None]
-    D = rounded(found.bodies[0].D)
-    mine = [
-        _Configuration(
-            each.name,
-            {one: float(q[ours.position_index(one)]) for _, one, _ in joints},
-            {one: _rotation(ours, q, one) for _, one, _ in balls},
-            _base(q) if ours.floating else None,
-            each.line,
-        )
-        for each in ours.stated_configurations
-        for q in [ours.configurations[each.name]]
-    ]
-    other = [
-        _Configuration(
-            each.name,
-            {one: fit.sign * float(q[theirs.position_index(two)]) for fit, one, two in joints},
-            {one: fit.turns[0] @ _rotation(theirs, q, two) @ fit.turns[1] for fit, one, two in balls},
-            _base(q) @ inverse(D) if theirs.floating else None,
-            each.line,
-        )
-        for each in theirs.stated_configurations
-        for q in [theirs.configurations[each.name]]
-    ]
-    reach = max(found.ours.reach, 1.0)
-
-    def changed(a: _Configuration, b: _Configuration) -> list[str]:
-        """Return the names of the joints whose positions differ."""
-        return [
-            name
-            for name, x in a.positions.items()
-            if abs(x - b.positions[name]) > tolerance * (reach if ours.joint(name).unit == "m" else 1.0)
-        ] + [
-            name
-            for name, R in a.rotations.items()
-            if np.abs(R - b.rotations[name]).max() > ROTATION_ENTRIES * tolerance
-        ]
-
-    def base_differs(a: _Configuration, b: _Configuration) -> bool:
-        if a.T_world_base is None or b.T_world_base is None:
-            return False
-        size = reach + float(np.abs(a.T_world_base[:3, 3]).max())
-        off = np.abs(a.T_world_base - b.T_world_base)
-        return bool(off[:3, :3].max() > ROTATION_ENTRIES * tolerance or off[:3, 3].max() > tolerance * size)
-
-    def are_equal(a: _Configuration, b: _Configuration) -> bool:
-        return not changed(a, b) and not base_differs(a, b)
-
-    for one, two, equal in counterparts(mine, other, are_equal, lambda _: None):
+    rules = _Configurations(ours, theirs, found, tolerance)
+    for one, two, equal in rules.pairs():
         at, by_base = list[str](), False
         if one is not None and two is not None:
-            at, by_base = changed(one, two), base_differs(one, two)
+            at, by_base = rules.changed(one, two), rules.base_differs(one, two)
         labels = [None if each is None else each.name for each in (one, two)]
         texts = ["none" if each is None else _text(each, at, by_base) for each in (one, two)]
         lines = [None if each is None else each.line for each in (one, two)]
@@ -108,6 +53,89 @@ def configuration_differences(
         else:
             continue
         yield Attribute(kind, "configuration", labels[0], labels[1], texts[0], texts[1], lines[0], lines[1])
+
+
+def configuration_pairs(
+    ours: Model, theirs: Model, found: Fit, tolerance: float
+) -> Iterator[tuple[NamedConfiguration | None, NamedConfiguration | None, bool]]:
+    """Yield the configurations that correspond, by their names or because they are equal, each pair with
+    whether they are; None for one alone."""
+    mine, other = (
+        {each.name: each for each in model.stated_configurations or ()} for model in (ours, theirs)
+    )
+    for one, two, equal in _Configurations(ours, theirs, found, tolerance).pairs():
+        yield None if one is None else mine[one.name], None if two is None else other[two.name], equal
+
+
+class _Configurations:
+    """The named configurations of two robots, in the coordinates of the first."""
+
+    def __init__(self, ours: Model, theirs: Model, found: Fit, tolerance: float) -> None:
+        self._ours, self._tolerance = ours, tolerance
+        self._reach = max(found.ours.reach, 1.0)
+        self.mine: list[_Configuration] = []
+        self.other: list[_Configuration] = []
+        if ours.stated_configurations is None or theirs.stated_configurations is None:
+            return
+        joints = [
+            (each, found.ours.joints[each.ours].name, found.theirs.joints[each.theirs].name)
+            for each in found.bodies[1:]
+        ]
+        joints = [row for row in joints if row[1] in ours.joint_names and row[2] in theirs.joint_names]
+        balls = [row for row in joints if row[0].before is not None]
+        joints = [row for row in joints if row[0].before is None]
+        D = rounded(found.bodies[0].D)
+        self.mine = [
+            _Configuration(
+                each.name,
+                {one: float(q[ours.position_index(one)]) for _, one, _ in joints},
+                {one: _rotation(ours, q, one) for _, one, _ in balls},
+                _base(q) if ours.floating else None,
+                each.line,
+            )
+            for each in ours.stated_configurations
+            for q in [ours.configurations[each.name]]
+        ]
+        self.other = [
+            _Configuration(
+                each.name,
+                {one: fit.sign * float(q[theirs.position_index(two)]) for fit, one, two in joints},
+                {one: fit.turns[0] @ _rotation(theirs, q, two) @ fit.turns[1] for fit, one, two in balls},
+                _base(q) @ inverse(D) if theirs.floating else None,
+                each.line,
+            )
+            for each in theirs.stated_configurations
+            for q in [theirs.configurations[each.name]]
+        ]
+
+    def pairs(self) -> Iterator[tuple[_Configuration | None, _Configuration | None, bool]]:
+        """Yield the configurations that correspond, each pair with whether they are equal."""
+        return counterparts(self.mine, self.other, self._are_equal, lambda _: None)
+
+    def changed(self, a: _Configuration, b: _Configuration) -> list[str]:
+        """Return the names of the joints whose positions differ."""
+        tolerance, joint = self._tolerance, self._ours.joint
+        return [
+            name
+            for name, x in a.positions.items()
+            if abs(x - b.positions[name]) > tolerance * (self._reach if joint(name).unit == "m" else 1.0)
+        ] + [
+            name
+            for name, R in a.rotations.items()
+            if np.abs(R - b.rotations[name]).max() > ROTATION_ENTRIES * tolerance
+        ]
+
+    def base_differs(self, a: _Configuration, b: _Configuration) -> bool:
+        """Check whether the poses of floating bases differ."""
+        if a.T_world_base is None or b.T_world_base is None:
+            return False
+        size = self._reach + float(np.abs(a.T_world_base[:3, 3]).max())
+        off = np.abs(a.T_world_base - b.T_world_base)
+        turned = bool(off[:3, :3].max() > ROTATION_ENTRIES * self._tolerance)
+        return turned or bool(off[:3, 3].max() > self._tolerance * size)
+
+    def _are_equal(self, a: _Configuration, b: _Configuration) -> bool:
+        return not self.changed(a, b) and not self.base_differs(a, b)
 
 
 def _rotation(model: Model, q: Floats, ball: str) -> Floats:

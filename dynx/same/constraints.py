@@ -31,20 +31,21 @@ def tendon_pairs(
     ours: Model, theirs: Model, found: Fit, tolerance: float
 ) -> Iterator[tuple[StatedTendon | None, StatedTendon | None]]:
     """Yield the tendons that correspond, by their names or because they are equal; None for one alone."""
-    for mine, other, _ in _compared_tendons(ours, theirs, found, tolerance):
+    for mine, other, _ in tendon_pairs_compared(ours, theirs, found, tolerance):
         yield mine, other
 
 
 def tendon_differences(ours: Model, theirs: Model, found: Fit, tolerance: float) -> Iterator[Attribute]:
     """Yield the tendons that differ, that one description has alone, or that have other names; nothing where
     a description leaves tendons open. Coefficients have the signs of the joints' positions."""
-    pairs = _compared_tendons(ours, theirs, found, tolerance)
+    pairs = tendon_pairs_compared(ours, theirs, found, tolerance)
     yield from part_differences(pairs, "tendon", "tendon", tendon_text, lambda each: each.joints[0])
 
 
-def _compared_tendons(
+def tendon_pairs_compared(
     ours: Model, theirs: Model, found: Fit, tolerance: float
 ) -> Iterator[tuple[StatedTendon | None, StatedTendon | None, bool]]:
+    """Yield the pairs of `tendon_pairs`, each with whether both are equal."""
     if ours.tendons is None or theirs.tendons is None:
         return iter(())
 
@@ -102,16 +103,25 @@ def equality_differences(
     A constraint of frames is equal to one of links that holds the same. One that couples the same parts in
     the other order is a freedom.
     """
-    if ours.equalities is None or theirs.equalities is None:
-        return
     rules = _Constraints(ours, theirs, found, tolerance)
-    pairs = list(counterparts(ours.equalities, theirs.equalities, rules.are_equal, lambda each: each.type))
+    pairs = list(equality_pairs(ours, theirs, found, tolerance))
     yield from part_differences(iter(pairs), "equality", "equality", equality_text, lambda each: each.type)
     for mine, other, equal in pairs:
         if equal and mine is not None and other is not None and not rules.are_in_order(mine, other):
             name = other.name or other.type
             message = f"constraint {name} couples the same parts in the other order"
             yield DescriptionFreedom("constraint", mine.name or mine.type, name, message)
+
+
+def equality_pairs(
+    ours: Model, theirs: Model, found: Fit, tolerance: float
+) -> Iterator[tuple[StatedEquality | None, StatedEquality | None, bool]]:
+    """Yield the constraints that correspond, by their names or because they are equal, each pair with whether
+    they are; None for one alone. Nothing where a description leaves them open."""
+    if ours.equalities is None or theirs.equalities is None:
+        return iter(())
+    rules = _Constraints(ours, theirs, found, tolerance)
+    return counterparts(ours.equalities, theirs.equalities, rules.are_equal, lambda each: each.type)
 
 
 def equality_text(equality: StatedEquality) -> str:

@@ -353,7 +353,9 @@ class Matching:
         far as they can; they are the only ones where a body is symmetric about its axis."""
         axis, other = self.ours.axes[a], D[:3, :3] @ self.theirs.axes[b]
         mine, theirs = self.ours.inertias[a], self.theirs.inertias[b]
-        for sign in (1.0, -1.0):
+        # The nearest of both first: a slide turned by half a turn fits but for what its parent may have.
+        near = 1.0 if float(other @ axis) >= 0.0 else -1.0
+        for sign in (near, -near):
             normal = cross(sign * other, axis)
             sine, cosine = float(np.linalg.norm(normal)), float(sign * other @ axis)
             R = D[:3, :3]

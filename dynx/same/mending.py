@@ -6,17 +6,26 @@ mended wherever they differ; in MJCF and SDF inertias, places of bodies and axes
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from xml.etree import ElementTree
+from xml.etree.ElementTree import tostring
 
 import numpy as np
 
 from dynx.model import Model
-from dynx.model.elements import Inertial, Joint, Pose
+from dynx.model.elements import Inertial, Joint, NamedConfiguration, Pose
+from dynx.model.equalities import StatedEquality
+from dynx.model.mjcf.equalities import EqualityWriter
 from dynx.model.mjcf.expansion import read_document
+from dynx.model.mjcf.sensor_objects import WORLD
+from dynx.model.mjcf.tendons import write_tendons
 from dynx.model.mjcf.writer import inertial_attributes
+from dynx.model.tendons import StatedTendon
 from dynx.model.xml.reading import Element
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.model.xml.text import quoteattr
+from dynx.same.stated_parts import StatedChange
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 
@@ -52,6 +61,107 @@ def mended_text(source: XmlSource, before: Model, after: Model) -> XmlSource:
         if link != other:
             found += edits.inertial(link.name, link.inertial, other.inertial)
     return source.apply(*found)
+
+
+def with_stated_parts(source: XmlSource, model: Model, changes: Sequence[StatedChange]) -> XmlSource:
+    """Return a text of MJCF in which tendons, constraints and keyframes are changed; `model` is its robot.
+
+    Raises NotMendedError for a part that does not stand in the file itself.
+    """
+    if source.root.tag != "mujoco":
+        raise NotMendedError(f"tendons, constraints and keyframes of <{source.root.tag}> are not mended")
+    found: list[Edit] = []
+    new: dict[str, list[str]] = {}
+    for each in changes:
+        written = None if each.new is None else _written(each, model)
+        old = None if each.old is None else _stated_element(source, each)
+        if old is None:
+            assert written is not None
+            new.setdefault(each.section, []).append(tostring(written, encoding="unicode"))
+        elif written is None:
+            found.append(source.removal(old))
+        else:
+            kept = {k: v for k, v in old.attributes.items() if k not in _STATED[each.section]}
+            written.attrib.update({k: v for k, v in kept.items() if k not in written.attrib})
+            found.append(source.replacement(old, tostring(written, encoding="unicode")))
+    for section, texts in new.items():
+        there = source.root.all(section)
+        if there:
+            found.append(source.insertion(there[0], "\n".join(texts)))
+        else:
+            lines = [f"<{section}>", *(f"  {text}" for text in texts), f"</{section}>"]
+            found.append(source.insertion(source.root, "\n".join(lines)))
+    return source.apply(*found)
+
+
+def _stated_element(source: XmlSource, change: StatedChange) -> SourceElement:
+    old = change.old
+    assert old is not None
+    for section in source.root.all(change.section):
+        for element in section.children:
+            if element.line == old.line and element.attributes.get("name", old.name) == old.name:
+                return element
+    raise NotMendedError(f"{change.words} does not stand in the file itself")
+
+
+_STATED = {
+    "tendon": frozenset(
+        (
+            *("range", "limited", "actuatorfrcrange", "actuatorfrclimited"),
+            *("stiffness", "springlength", "damping", "frictionloss", "armature"),
+        )
+    ),
+    "equality": frozenset(
+        (
+            *("body1", "body2", "site1", "site2", "joint1", "joint2", "tendon1", "tendon2"),
+            *("anchor", "relpose", "polycoef", "torquescale", "active", "solref", "solimp"),
+        )
+    ),
+    "keyframe": frozenset(("qpos",)),
+}
+"""Attributes that a part has instead of those in the file."""
+
+
+def _written(change: StatedChange, model: Model) -> ElementTree.Element:
+    """Return the element of a part, with what a default class may state otherwise."""
+    name: str = change.section
+    section, new = ElementTree.Element(name), change.new
+    if isinstance(new, StatedTendon):
+        write_tendons(section, [new])
+        given = section[0].attrib
+        for name in ("stiffness", "damping", "frictionloss", "armature"):
+            given.setdefault(name, "0")
+        for flag, ends in (("limited", "range"), ("actuatorfrclimited", "actuatorfrcrange")):
+            given[flag] = "true" if ends in given else "false"
+    elif isinstance(new, StatedEquality):
+        poses, reference = _pose_of_file(model)
+        if not EqualityWriter({}, poses, reference).write(section, new):
+            raise NotMendedError(f"{change.words}: its points do not coincide in the pose of the file")
+        section[0].attrib.setdefault("active", "true")
+    else:
+        assert isinstance(new, NamedConfiguration)
+        named = replace(model, stated_configurations=(new,))
+        q = named.configurations[new.name].copy()
+        for first in model.quaternions:
+            q[first : first + 4] = np.roll(q[first : first + 4], 1)  # w is the first in MJCF
+        ElementTree.SubElement(section, "key", name=new.name, qpos=numbers(q))
+    return section[0]
+
+
+def _pose_of_file(model: Model) -> tuple[dict[str, Floats], Callable[[str, str], float]]:
+    """Return the poses (4, 4) of links in the pose of the file, and what a joint or tendon has in it."""
+    from dynx.reference.backend import ReferenceBackend  # rarely needed
+
+    q = model.initial_configuration
+    poses = ReferenceBackend(model).forward_kinematics(q)
+    found = {frame.name: T for frame, T in zip(model.frames, poses, strict=True)} | {WORLD: np.eye(4)}
+    tendons = {each.name: each.terms for each in model.tendons or ()}
+
+    def reference(kind: str, name: str) -> float:
+        terms = ((name, 1.0),) if kind == "joint" else tendons[name]
+        return float(sum(factor * q[model.position_index(joint)] for joint, factor in terms))
+
+    return found, reference
 
 
 def number(value: float) -> str:

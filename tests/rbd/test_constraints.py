@@ -16,16 +16,13 @@ from dynx.rbd.constraints import (
     ConstraintSets,
     Disk,
     Solution,
-    frozen_sweep,
     rebound,
     residuals,
     scales,
     solve,
     sweep,
 )
-from dynx.simd.cache import load_kernel, program_recipe
-from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Floats
 from tests.rbd.exact import exactly, fifty_digits
 
 G_H = 9.81e-3
@@ -203,42 +200,9 @@ def test_sweeps_of_the_same_text_in_50_digits_confirm_the_velocities(slope: floa
         g, floors = scales(sets, exact_G), exactly(np.zeros(sets.size))
         state = (exactly(np.zeros(sets.size)), exact_c, mpmath.inf)
         for _ in range(2000):
-            state = frozen_sweep(sets, exact_G, g, exact_limits, floors, state, mpmath.mpf(10) ** -45)
+            state = sweep(sets, exact_G, g, exact_limits, floors, *state[:2])
             if state[2] < mpmath.mpf(10) ** -45:
                 break
         violated = residuals(sets, g, exact_limits, floors, state[0], exact_c + exact_G @ state[0])
         assert violated.largest < mpmath.mpf(10) ** -44
         assert max(abs(state[1] - found.velocities)) < 10 * TOLERANCE
-
-
-def test_lanes_of_a_kernel_freeze_where_they_are_finished_and_depend_on_no_neighbour() -> None:
-    count, tolerance = 12, 1e-6
-    sets, G, _ = stack([1.0], gravity(1))
-    limits, floors = np.full(len(sets.disks), 0.5), np.zeros(sets.size)
-
-    def swept(c: Array) -> dict[str, Array]:
-        g = scales(sets, G)
-        state = np.array([0.0 * c[0]] * sets.size, dtype=object), c, 1.0
-        for _ in range(count):
-            state = frozen_sweep(sets, G, g, limits, floors, state, tolerance)
-        return {"impulses": state[0], "change": np.array([state[2]], dtype=object)}
-
-    program = trace(swept, {"c": (sets.size,)})
-    kernel = load_kernel(program_recipe(program), lambda: program)
-    rng = np.random.default_rng(1)
-    c = np.array([stack([1.0], gravity(1) + s * rng.standard_normal(6))[2] for s in np.logspace(-9, 0, 19)])
-    together = [np.empty((len(c), sets.size)), np.empty((len(c), 1))]
-    kernel([c], together)
-    g, finished = scales(sets, G), 0
-    for k, row in enumerate(c):
-        alone = [np.empty((1, sets.size)), np.empty((1, 1))]
-        kernel([row[None]], alone)
-        assert alone[0][0].tobytes() == together[0][k].tobytes()
-        x, w, change, taken = np.zeros(sets.size), row, 1.0, 0
-        while change > tolerance and taken < count:
-            x, w, change = sweep(sets, G, g, limits, floors, x, w)
-            taken += 1
-        finished += taken < count
-        assert together[0][k] == pytest.approx(x, rel=1e-9, abs=1e-12)
-        assert together[1][k, 0] == pytest.approx(change, rel=1e-6, abs=1e-13)
-    assert 0 < finished < len(c)

@@ -1,0 +1,303 @@
+"""Tendons, equality constraints and named configurations of the first robot in the names and coordinates of
+the second one: what the second is to state, and the effect of what it states instead."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from dynx.model import Model
+from dynx.model.elements import NamedConfiguration, Pose
+from dynx.model.equalities import StatedEquality
+from dynx.model.mjcf.sensor_objects import WORLD
+from dynx.model.tendons import StatedTendon
+from dynx.same.attributes import StatedEffect
+from dynx.same.configurations import configuration_pairs
+from dynx.same.constraints import equality_pairs, tendon_pairs_compared
+from dynx.same.decimals import decimals, rounded
+from dynx.same.effects import SEED, STATES
+from dynx.same.fit import Fit
+from dynx.same.places import WORLD_BODY, Places
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous, inverse
+from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
+
+Section = Literal["tendon", "equality", "keyframe"]
+StatedPart = StatedTendon | StatedEquality | NamedConfiguration
+
+
+@dataclass(frozen=True)
+class StatedChange:
+    """A part `old` of the second robot, None if it has none, and what it is to be; None: not there."""
+
+    section: Section
+    old: StatedPart | None
+    new: StatedPart | None
+
+    @property
+    def words(self) -> str:
+        """Kind and name of the part."""
+        each = self.old or self.new
+        assert each is not None
+        return f"{self.section} {each.name or 'without a name'}"
+
+
+class StatedParts:
+    """Parts of the first robot in the names and coordinates of the second; call it inside `fifty_digits`."""
+
+    def __init__(self, ours: Model, theirs: Model, found: Fit, tolerance: float) -> None:
+        self._ours, self._theirs, self._found, self._tolerance = ours, theirs, found, tolerance
+        fits = [each for each in found.bodies if each.ours >= 0]
+        self._fits = {found.ours.joints[each.ours].name: each for each in fits}
+        self._names = {mine: found.theirs.joints[each.theirs].name for mine, each in self._fits.items()}
+        self._places = Places(ours, theirs, found)
+
+    def changes(self) -> Iterator[StatedChange | str]:
+        """Yield what differs with what it is to be, or in words what has no counterpart in the second."""
+        both = self._ours, self._theirs, self._found, self._tolerance
+        self._tendons = {
+            mine.name: other.name
+            for mine, other, _ in tendon_pairs_compared(*both)
+            if mine is not None and other is not None
+        }
+        for mine, other, equal in tendon_pairs_compared(*both):
+            if not equal:
+                yield self._change("tendon", mine, other, None if mine is None else self._tendon(mine))
+        for held, by, equal in equality_pairs(*both):
+            if not equal:
+                yield self._change("equality", held, by, None if held is None else self._equality(held))
+        for one, two, equal in configuration_pairs(*both):
+            if not equal:
+                yield self._change("keyframe", one, two, None if one is None else self._configuration(one))
+
+    def _change(
+        self, section: Section, mine: StatedPart | None, old: StatedPart | None, new: StatedPart | None
+    ) -> StatedChange | str:
+        if mine is not None and new is None:
+            return (
+                f"{section} {mine.name or 'without a name'} is not mended: the second robot lacks its parts"
+            )
+        if new is not None and old is not None:
+            new = replace(new, name=old.name, line=old.line)
+        return StatedChange(section, old, new)
+
+    # -- what the second robot is to state ----------------------------------------------------------------
+
+    def _tendon(self, mine: StatedTendon) -> StatedTendon | None:
+        if any(joint not in self._names for joint in mine.joints):
+            return None
+        terms = tuple((self._names[joint], self._fits[joint].sign * factor) for joint, factor in mine.terms)
+        return replace(mine, terms=terms)
+
+    def _equality(self, mine: StatedEquality) -> StatedEquality | None:
+        if mine.type in ("joint", "tendon"):
+            names = self._names if mine.type == "joint" else self._tendons
+            if any(each not in names for each in mine.objects):
+                return None
+            signs = [self._fits[each].sign if mine.type == "joint" else 1 for each in mine.objects] + [1]
+            numbers = signs[0] * mine.absolute_polynomial * signs[1] ** np.arange(5.0)
+            a, b, c, d, e = (numbers + 0.0).tolist()
+            first, second = ([*(names[each] for each in mine.objects), ""])[:2]
+            return replace(
+                mine, first=first, second=second, polynomial=(a, b, c, d, e), references=(0.0, 0.0)
+            )
+        ends = []
+        for name, pose in zip(mine.objects, (mine.first_pose, mine.second_pose), strict=True):
+            place = self._places.ours(name)
+            if place is None:
+                return None
+            T = place.T @ decimals(pose.matrix)
+            found = self._link(name, place.body, T)
+            if found is None:
+                return None
+            ends.append(found)
+        (first, T_first), (second, T_second) = ends
+        if mine.type == "connect":
+            # Only the points coincide.
+            T_first, T_second = (homogeneous(np.eye(3), T[:3, 3]) for T in (T_first, T_second))
+        else:
+            # The second pose is only a place in MJCF: both are turned together.
+            R = T_second[:3, :3].T
+            T_first, T_second = (T @ homogeneous(R, np.zeros(3)) for T in (T_first, T_second))
+        poses = Pose.from_matrix(T_first), Pose.from_matrix(T_second)
+        return replace(
+            mine,
+            object_type="xbody",
+            first=first,
+            second=second,
+            first_pose=poses[0],
+            second_pose=Pose(poses[1].xyz),
+        )
+
+    def _link(self, name: str, body: int, T: Floats) -> tuple[str, Floats] | None:
+        """Return a link of the second robot in the counterpart of our body, that of our link's name if it is
+        there, and the pose (4, 4) in it of a pose T in our body."""
+        if body == WORLD_BODY:
+            return WORLD, rounded(T)
+        each = next((each for each in self._found.bodies if each.ours == body), None)
+        if each is None:
+            return None
+        skeleton = self._found.theirs
+        links = {skeleton.model.links[k].name: k for k in skeleton.links[each.theirs]}
+        number = links.get(name, next(iter(links.values())))
+        back = inverse(skeleton.link_pose(number)) @ inverse(each.D)
+        return skeleton.model.links[number].name, rounded(back @ T)
+
+    def _configuration(self, mine: NamedConfiguration) -> NamedConfiguration:
+        theirs = self._theirs
+        q, other = self._ours.configurations[mine.name], theirs.neutral()
+        for joint, name in self._names.items():
+            if joint not in self._ours.joint_names or name not in theirs.joint_names:
+                continue
+            each, i, j = self._fits[joint], self._ours.position_index(joint), theirs.position_index(name)
+            if each.before is None:
+                other[j] = each.sign * q[i]
+            else:
+                before, after = each.turns
+                R = before.T @ rotation_from_quat(q[i : i + 4]) @ after.T
+                other[j : j + 4] = quat_from_rotation(R)
+        base = None
+        if theirs.floating and self._ours.floating:
+            T = homogeneous(rotation_from_quat(q[3:7]), q[:3]) @ rounded(self._found.bodies[0].D)
+            base = (*T[:3, 3].tolist(), *quat_from_rotation(T[:3, :3]).tolist())
+        positions = []
+        for part in (each for each in theirs.joints if each.name in theirs.joint_names):
+            start = theirs.position_index(part.name)
+            numbers = other[start : start + (4 if part.type == "ball" else 1)] + 0.0
+            positions.append((part.name, tuple(numbers.tolist())))
+        return NamedConfiguration(mine.name, tuple(positions), base)
+
+
+def changed_model(theirs: Model, changes: Iterable[StatedChange]) -> Model:
+    """Return the second robot with parts changed."""
+    parts: dict[str, list[StatedPart]] = {
+        "tendon": [*(theirs.tendons or ())],
+        "equality": [*(theirs.equalities or ())],
+        "keyframe": [*(theirs.stated_configurations or ())],
+    }
+    for each in changes:
+        own = parts[each.section]
+        if each.old is None:
+            own += [each.new] if each.new is not None else []
+        else:
+            at = next(k for k, part in enumerate(own) if part is each.old or part == each.old)
+            own[at : at + 1] = [] if each.new is None else [each.new]
+    return replace(
+        theirs,
+        tendons=tuple(each for each in parts["tendon"] if isinstance(each, StatedTendon)),
+        equalities=tuple(each for each in parts["equality"] if isinstance(each, StatedEquality)),
+        stated_configurations=tuple(
+            each for each in parts["keyframe"] if isinstance(each, NamedConfiguration)
+        ),
+    )
+
+
+# -- effects ------------------------------------------------------------------------------------------------
+
+
+def effects_of(change: StatedChange, theirs: Model) -> tuple[StatedEffect, ...]:
+    """Return the effects of a part of the second robot that differs: over random states within its limits, or
+    at the configuration. There is none of a part that one robot has alone."""
+    old, new = change.old, change.new
+    if isinstance(old, StatedTendon) and isinstance(new, StatedTendon):
+        return _effects_of_tendon(old, new, theirs)
+    if isinstance(old, StatedEquality) and isinstance(new, StatedEquality):
+        return _effects_of_equality(old, new, theirs)
+    if isinstance(old, NamedConfiguration) and isinstance(new, NamedConfiguration):
+        return _effects_of_configuration(old, new, theirs)
+    return ()
+
+
+def _states(theirs: Model) -> tuple[Floats, Floats]:
+    rng = np.random.default_rng(SEED)
+    return theirs.random(rng, STATES), rng.uniform(-1.0, 1.0, (STATES, theirs.nv))
+
+
+def _effects_of_tendon(old: StatedTendon, new: StatedTendon, theirs: Model) -> tuple[StatedEffect, ...]:
+    q, v = _states(theirs)
+    lengths, efforts = [], []
+    for each in (old, new):
+        length, rate = np.zeros(STATES), np.zeros(STATES)
+        for joint, factor in each.terms:
+            length += factor * q[:, theirs.position_index(joint)]
+            rate += factor * v[:, theirs.coordinate_index(joint)]
+        low, high = each.spring_length
+        stretch = np.maximum(length - high, 0.0) - np.maximum(low - length, 0.0)
+        tension = -each.stiffness * stretch - each.damping * rate - each.friction * np.sign(rate)
+        effort = np.zeros((STATES, theirs.nv))
+        for joint, factor in each.terms:
+            effort[:, theirs.coordinate_index(joint)] += factor * tension
+        lengths.append(length)
+        efforts.append(effort)
+    return (
+        StatedEffect("length of the tendon", float(np.max(np.abs(lengths[0] - lengths[1]))), "rad or m"),
+        StatedEffect("effort of a joint", float(np.max(np.abs(efforts[0] - efforts[1]))), "N m or N"),
+    )
+
+
+def _effects_of_equality(old: StatedEquality, new: StatedEquality, theirs: Model) -> tuple[StatedEffect, ...]:
+    """Return by how much what both constraints hold at 0 differs."""
+    q, _ = _states(theirs)
+    if (old.type in ("joint", "tendon")) != (new.type in ("joint", "tendon")):
+        return ()
+    if new.type in ("joint", "tendon"):
+        errors = [_coupling_error(each, theirs, q) for each in (old, new)]
+        size = float(np.max(np.abs(errors[0] - errors[1])))
+        return (StatedEffect("error of the coupling", size, "rad or m"),)
+    from dynx.reference.backend import ReferenceBackend  # rarely needed
+
+    poses = ReferenceBackend(theirs).forward_kinematics(q)
+    frames = {frame.name: number for number, frame in enumerate(theirs.frames)}
+
+    def place(name: str, pose: Pose) -> Floats:
+        if name in frames:
+            return np.asarray(poses[:, frames[name]] @ pose.matrix)
+        return np.broadcast_to(pose.matrix, (STATES, 4, 4))
+
+    gaps = []
+    for each in (old, new):
+        one, two = place(each.first, each.first_pose), place(each.second, each.second_pose)
+        gaps.append((two[:, :3, 3] - one[:, :3, 3], np.swapaxes(one[:, :3, :3], -1, -2) @ two[:, :3, :3]))
+    (shift, turn), (other_shift, other_turn) = gaps
+    gap = float(np.max(np.linalg.norm(shift - other_shift, axis=-1)))
+    found = [StatedEffect("gap of the constraint", gap, "m")]
+    if old.type == new.type == "weld":
+        cosines = (np.einsum("nij,nij->n", turn, other_turn) - 1.0) / 2.0
+        found.append(
+            StatedEffect(
+                "rotation of the constraint", float(np.arccos(np.clip(cosines, -1.0, 1.0)).max()), "rad"
+            )
+        )
+    return tuple(found)
+
+
+def _coupling_error(equality: StatedEquality, theirs: Model, q: Floats) -> Floats:
+    def value(name: str) -> Floats:
+        if equality.type == "joint":
+            return np.asarray(q[:, theirs.position_index(name)])
+        tendon = next(each for each in theirs.tendons or () if each.name == name)
+        return np.asarray(sum(factor * q[:, theirs.position_index(joint)] for joint, factor in tendon.terms))
+
+    y, x = value(equality.first), value(equality.second) if equality.second else np.zeros(STATES)
+    numbers = equality.absolute_polynomial
+    return y - (np.polynomial.Polynomial(numbers)(x) if equality.second else numbers[0])
+
+
+def _effects_of_configuration(
+    old: NamedConfiguration, new: NamedConfiguration, theirs: Model
+) -> tuple[StatedEffect, ...]:
+    from dynx.reference.backend import ReferenceBackend  # rarely needed
+
+    model = replace(theirs, stated_configurations=(replace(old, name="old"), replace(new, name="new")))
+    q = np.stack([model.configurations["old"], model.configurations["new"]])
+    poses = ReferenceBackend(theirs).forward_kinematics(q)
+    moved = float(np.max(np.linalg.norm(poses[1, :, :3, 3] - poses[0, :, :3, 3], axis=-1)))
+    joints = theirs.difference(q[0], q[1])[6 * theirs.floating :]
+    turned = float(np.max(np.abs(joints), initial=0.0))
+    return (
+        StatedEffect("position of a joint", turned, "rad or m"),
+        StatedEffect("position of a link", moved, "m"),
+    )
