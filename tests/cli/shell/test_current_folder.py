@@ -31,7 +31,7 @@ CALLS = {
     "train": "train CartPole-v1 --steps 64 --envs 2 --processes --set n_steps=16 --set batch_size=32 "
     "--episodes 1 --out trained --tensorboard --plot curve.png",
     "play": "play trained/final.zip --episodes 1",
-    "contacts": "contacts --case slope --dt 0.004 --jobs 1",
+    "contacts": "contacts --case resting_force --dt 0.004 --jobs 1",
     "bench": "bench double_pendulum --backends reference,mujoco --quantity mass-matrix --batch 1 --threads 1 "
     "--quick",
     "explain": "explain DX101",
