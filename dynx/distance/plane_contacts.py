@@ -100,16 +100,9 @@ def fine_rim(a: PlacedSolid, plane: PlacedSolid, within: float) -> list[ContactC
     height = dot(up, (a.p[0] - plane.p[0], a.p[1] - plane.p[1], a.p[2] - plane.p[2]))
     end = 0 if cz > 0.0 else 1
     s, first = core.half if end else -core.half, FIRST_FINE_RIM + end * FINE_RIM
-    for k, (c, d) in enumerate(_FINE_RIM):
-        if 4 * k % FINE_RIM:
-            p, q = core.rim_radius * c, core.rim_radius * d
-            add(
-                p * x[0] + q * y[0] + s * z[0],
-                p * x[1] + q * y[1] + s * z[1],
-                p * x[2] + q * y[2] + s * z[2],
-                height + p * cx + q * cy + s * cz,
-                first + k,
-            )
+    r = core.rim_radius
+    points = [(r * c, r * d, first + k) for k, (c, d) in enumerate(_FINE_RIM) if 4 * k % FINE_RIM]
+    _add_rim(points, s, a, height, (cx, cy, cz), add)
     return found
 
 
@@ -167,14 +160,17 @@ def _add_cylinder(core: CylinderCore, a: PlacedSolid, up: Vector3, height: float
             ]
         if across > MIN_RIM_TILT:
             points.append((-r * cx / across, -r * cy / across, LOWEST_RIM + this_end))
-        for p, q, part in points:
-            add(
-                p * x[0] + q * y[0] + s * z[0],
-                p * x[1] + q * y[1] + s * z[1],
-                p * x[2] + q * y[2] + s * z[2],
-                height + p * cx + q * cy + s * cz,
-                part,
-            )
+        _add_rim(points, s, a, height, (cx, cy, cz), add)
+
+
+def _add_rim(
+    points: list[tuple[float, float, int]], s: float, a: PlacedSolid, height: float, c: Vector3, add: AddPoint
+) -> None:
+    """Add points of a rim at s along the axis, whose axes have the components c along the normal."""
+    x, y, z = a.axes
+    for p, q, part in points:
+        px, py, pz = (p * x[k] + q * y[k] + s * z[k] for k in range(3))
+        add(px, py, pz, height + p * c[0] + q * c[1] + s * c[2], part)
 
 
 def _add_hull(
