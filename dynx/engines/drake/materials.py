@@ -40,7 +40,8 @@ _HYDROELASTIC = ("contact_model", ("hydroelastic",))
 SETTINGS: Mapping[str, Setting] = {
     "contact_approximation": Setting(
         "lagged",
-        "Drake's approximation of discrete contact; under 'sap' a sliding body glides above the ground",
+        "Drake's approximation of discrete contact: 'lagged', 'similar' or 'sap'; with 'sap' a sliding body "
+        "glides above the ground",
         choices=("sap", "lagged", "similar"),
     ),
     "contact_model": Setting(
@@ -59,12 +60,13 @@ SETTINGS: Mapping[str, Setting] = {
     "stiffness": Setting(1e6, "stiffness of every shape in point contact [N/m]", 1e-3),
     "relaxation_time": Setting(
         0.01,
-        "relaxation time of contacts under 'sap', which sets their dissipation [s]",
+        "relaxation time of contacts [s], which sets their damping, if `contact_approximation` is 'sap'",
         needs=("contact_approximation", ("sap",)),
     ),
     "dissipation": Setting(
         10.0,
-        "dissipation of Hunt and Crossley under 'lagged' and 'similar' [s/m]",
+        "damping of contacts by the law of Hunt and Crossley [s/m], if `contact_approximation` is 'lagged' "
+        "or 'similar'",
         needs=("contact_approximation", ("lagged", "similar")),
     ),
     "stiction_tolerance": Setting(1e-4, "sliding speed below which shapes count as sticking [m/s]", 1e-9),

@@ -43,7 +43,12 @@ SETTINGS: Mapping[str, Setting] = {
         "shape of the friction cone: 'elliptic' or 'pyramidal'",
         choices=("elliptic", "pyramidal"),
     ),
-    "impratio": Setting(100.0, "ratio of the impedances of friction and normal force", 1e-6),
+    "impratio": Setting(
+        100.0,
+        "MuJoCo's impratio: hardness of friction relative to that of the normal force; a larger value "
+        "reduces the creep of sticking contacts",
+        1e-6,
+    ),
     "noslip_iterations": Setting(0, "iterations of the solver that removes slip", 0),
     "ccd_iterations": Setting(50, "largest number of iterations of convex collision detection", 1),
     "time_constant": Setting(
@@ -53,8 +58,8 @@ SETTINGS: Mapping[str, Setting] = {
     ),
     "slip_time_constant": Setting(
         0.01,
-        "time constant at which slip decays in contacts that stick [s], at least one step; with a "
-        "small value, sliding bodies may hop",
+        "time constant at which friction stops a slow slip [s], at least one step; with a small value, "
+        "fast sliding bodies may hop",
         1e-6,
     ),
     "impedance": Setting(

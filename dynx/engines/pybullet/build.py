@@ -122,8 +122,8 @@ SETTINGS = {
     "contact_erp": Setting(0.05, "share of a penetration removed in a step", most=1.0),
     "friction_anchors": Setting(
         False,
-        "whether sticking contacts are pulled back to the point where they formed; this also slows rolling "
-        "bodies",
+        "whether the engine pulls sticking contacts back to the point where they formed; this also slows "
+        "rolling bodies",
     ),
     "friction_erp": Setting(
         0.2,
