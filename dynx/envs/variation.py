@@ -20,12 +20,12 @@ from dynx.model import Model
 from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.elements import JointCoefficients
 from dynx.model.mechanism import Mechanism
-from dynx.rbd.contact_step import ServoJoints
 from dynx.rbd.parameters import JOINT, POINT, SPRING, Parameters
 from dynx.spatial.scalar import Array, Floats, sqrt
 from dynx.steppers.layout import stop_positions
 
 if TYPE_CHECKING:
+    from dynx.rbd.contact_step import ServoJoints
     from dynx.steppers.material import Material
     from dynx.world.motors import Motor
     from dynx.world.scene import Scene, SceneBody, SceneRobot

@@ -66,7 +66,7 @@ FLOWS = {
         ("world", "sim", "ik.closed_forms"),
         (),
         105,
-        18900,
+        19000,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -97,7 +97,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         104,
-        18900,
+        19000,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -107,7 +107,7 @@ FLOWS = {
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
         154,
-        27320,
+        27700,
     ),
 }
 
