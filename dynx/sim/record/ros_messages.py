@@ -3,11 +3,11 @@
 | topic | type | content |
 |---|---|---|
 | `/joint_states` | sensor_msgs/JointState | positions, velocities and efforts of the joints |
-| `/accelerations` | trajectory_msgs/JointTrajectory | accelerations of the joints, in one point |
+| `/accelerations` | trajectory_msgs/JointTrajectory | accelerations of the joints; one element in `points` |
 | `/saturated` | sensor_msgs/JointState | `effort` is 1 if the motor was at its limit, otherwise 0 |
-| `/energy` | std_msgs/Float64 | kinetic and potential energy [J] |
+| `/energy` | std_msgs/Float64 | sum of kinetic and potential energy [J] |
 | `/reference` | sensor_msgs/JointState | reference positions and velocities |
-| `/reference_accelerations` | trajectory_msgs/JointTrajectory | reference accelerations, in one point |
+| `/reference_accelerations` | trajectory_msgs/JointTrajectory | those of the reference, likewise |
 | `/error` | sensor_msgs/JointState | `position` is the tracking error: the reference minus the position |
 | `/robot_description` | std_msgs/String | the simulated robot as URDF, once, at the beginning |
 
@@ -19,7 +19,7 @@ A floating base adds these topics. Its pose is in the frame ``world`` (``map`` i
 | `/tf` | tf2_msgs/TFMessage | the pose of the root link |
 | `/base/odometry` | nav_msgs/Odometry | pose and velocity; covariances are 0 |
 | `/base/acceleration` | geometry_msgs/AccelStamped | derivative of the velocity in `/base/odometry` |
-| `/base/wrench` | geometry_msgs/WrenchStamped | wrench of the controller on the base, usually 0 |
+| `/base/wrench` | geometry_msgs/WrenchStamped | wrench that the controller exerts on the base, usually 0 |
 | `/base/reference` | nav_msgs/Odometry | reference pose and velocity |
 | `/base/reference_acceleration` | geometry_msgs/AccelStamped | reference acceleration |
 | `/base/error` | geometry_msgs/TwistStamped | translation [m], rotation [rad] from base to reference |
@@ -29,7 +29,7 @@ allow in names become ``_``:
 
 | topic | type | content |
 |---|---|---|
-| `/contacts/NAME` | geometry_msgs/WrenchStamped | sum of the contact forces on the part, in world axes |
+| `/contacts/NAME` | geometry_msgs/WrenchStamped | sum of contact forces on a body or link, in world axes |
 
 Each sensor of `Rollout.sensors` adds a topic of its samples. They are logged when they can be read; the stamp
 of their header is the time at which they were taken, and its frame is called like the sensor:
