@@ -38,7 +38,7 @@ from dynx.model import Model
 from dynx.model.elements import JointDynamics
 from dynx.model.geometry import Box
 from dynx.model.loading import load
-from dynx.rbd.contact_step import FramedShape, ShapesOnPlane
+from dynx.rbd.contact_step import FramedShape, ShapesOnPlane, spheres_on_plane
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
 from dynx.world import Material, Scene, SceneRobot, ground
@@ -324,7 +324,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     model = load("a1", base="floating")
     start = time.perf_counter()
-    text = contact_step_text(model, dict.fromkeys(FEET, RADIUS), h=H, kp=KP, kd=KD, friction=FRICTION)
+    feet = spheres_on_plane({model.frame_index(foot): RADIUS for foot in FEET}, FRICTION)
+    text = contact_step_text(model, feet, h=H, kp=KP, kd=KD)
     kernel = compiled(text)
     ready = time.perf_counter() - start
     print(f"kernel after {ready:.1f} s; {options.batch} robots, of MuJoCo {options.mujoco_batch}")

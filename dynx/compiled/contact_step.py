@@ -17,11 +17,9 @@ from dynx.model.geometry import Plane
 from dynx.rbd.base_parameters import regroup_inertias
 from dynx.rbd.contact_geometry import plane_point_count
 from dynx.rbd.contact_step import (
-    LEVEL,
     FramedShape,
     ServoJoints,
     ShapesOnPlane,
-    SpheresOnPlane,
     Sweeps,
     contact_step,
 )
@@ -35,35 +33,31 @@ INPUTS = ("friction", "gravity", "kp", "kd", "max_torque")
 
 def contact_step_text(
     model: Model,
-    shapes: Mapping[str, float] | ShapesOnPlane,
+    touching: ShapesOnPlane,
     *,
     h: float,
     kp: Floats | float,
     kd: Floats | float,
-    friction: float = 1.0,
     max_torque: Floats | float | None = None,
-    axes: Sequence[tuple[float, float, float]] | None = None,
-    offset: float = 0.0,
     sweeps: Sweeps | None = None,
     joint_limits: bool = False,
     inputs: Sequence[str] = (),
 ) -> StepText:
     """Return the text of a step of `h` [s] for `dynx.compiled.step`.
 
-    `shapes` are those that may touch a plane (`shapes_on_plane` returns those of a scene), or the radii [m]
-    of spheres at the origins of frames, with `friction`, and `axes` and `offset` of the plane. `kp` and `kd`
-    (n joints,) are the gains of the motors, `max_torque` (n joints,) their largest torques [N m or N]. Inputs
-    and outputs are q (nq,), v (nv,) and impulses (m,): three for each contact point, normal and tangents,
-    then one for each joint with dry friction or, with `joint_limits`, with a limit. Another input is target
-    (n joints,), another output residual (1,). Damping, dry friction, armature and springs of the joints are
-    in the step.
+    `touching` are the shapes that may touch a plane (`shapes_on_plane` returns those of a scene). `kp` and
+    `kd` (n joints,) are the gains of the motors, `max_torque` (n joints,) their largest torques [N m or N].
+    Inputs and outputs are q (nq,), v (nv,) and impulses (m,): three for each contact point, normal and
+    tangents, then one for each joint with dry friction or, with `joint_limits`, with a limit. Another input
+    is target (n joints,), another output residual (1,). Damping, dry friction, armature and springs of the
+    joints are in the step.
 
     Numbers named in `inputs` are inputs of the kernel instead of constants, so that they may differ from lane
     to lane: "friction" (a coefficient for each shape), "gravity" (3,), "kp", "kd" and "max_torque"
     (n joints,).
 
-    Raises UnsupportedFeatureError for a robot with mimic joints or ball joints, UnknownNameError for an
-    unknown frame, and ArgumentError for an unknown input.
+    Raises UnsupportedFeatureError for a robot with mimic joints or ball joints, and ArgumentError for an
+    unknown input.
     """
     refuse_ball_joints(model, "a compiled step with contacts")
     if model.mechanism.coupling is not None:
@@ -90,12 +84,6 @@ def contact_step_text(
         ),
         stop_positions(model) if joint_limits else None,
     )
-    if isinstance(shapes, ShapesOnPlane):
-        touching = shapes
-    else:
-        frames = tuple(model.frame_index(name) for name in shapes)
-        radii, level = tuple(shapes.values()), LEVEL if axes is None else tuple(axes)
-        touching = SpheresOnPlane(frames, radii, friction, level, offset).as_shapes
     bounds = Sweeps() if sweeps is None else sweeps
     sizes = {
         "q": model.nq,

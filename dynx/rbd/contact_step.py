@@ -22,7 +22,7 @@ joints between the base and the body that touches, and sweeps need no Delassus m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -121,29 +121,18 @@ class ShapesOnPlane:
         return [each.friction for count, each in pairs for _ in range(count)]
 
 
-@dataclass(frozen=True)
-class SpheresOnPlane:
-    """Spheres of a robot that may touch a plane of the world, the points x with normal . x = offset."""
+def spheres_on_plane(
+    radii: Mapping[int, float], friction: Any, axes: Axes = LEVEL, offset: Any = 0.0
+) -> ShapesOnPlane:
+    """Return spheres at the origins of frames, and a plane with that coefficient of `friction`.
 
-    frames: tuple[int, ...]
-    """Numbers of the frames of the mechanism at whose origins the spheres are."""
-    radii: tuple[float, ...]
-    """Radii [m]."""
-    friction: Any
-    """Coefficient of friction."""
-    axes: Axes = LEVEL
-    """Normal of the plane, outwards, and two tangents: orthogonal unit vectors."""
-    offset: Any = 0.0
-
-    @property
-    def as_shapes(self) -> ShapesOnPlane:
-        """The spheres as shapes."""
-        pairs = zip(self.frames, self.radii, strict=True)
-        shapes = [
-            FramedShape(frame, Sphere(radius), np.eye(3), np.zeros(3), self.friction)
-            for frame, radius in pairs
-        ]
-        return ShapesOnPlane(tuple(shapes), self.axes, self.offset)
+    `radii` [m] are by the numbers of the frames in the mechanism.
+    """
+    shapes = [
+        FramedShape(frame, Sphere(radius), np.eye(3), np.zeros(3), friction)
+        for frame, radius in radii.items()
+    ]
+    return ShapesOnPlane(tuple(shapes), axes, offset)
 
 
 @dataclass(frozen=True)
@@ -201,7 +190,7 @@ def repeat_numbers(step: Callable[[Numbers], Numbers], state: Numbers, most: int
 def contact_step(
     mechanism: Mechanism,
     joints: ServoJoints,
-    touching: ShapesOnPlane | SpheresOnPlane,
+    touching: ShapesOnPlane,
     sweeps: Sweeps,
     h: float,
     q: Array,
@@ -220,8 +209,6 @@ def contact_step(
     `regrouped` is the mechanism with base parameters (`dynx.rbd.base_parameters`), which take fewer
     operations for the bias torque. The residual is the largest violation of the laws of contact.
     """
-    if isinstance(touching, SpheresOnPlane):
-        touching = touching.as_shapes
     base, last = mechanism.nv - len(mechanism.bodies), mechanism.nv - 1
     M = mass_matrix(mechanism, q)
     bias = bias_torque(mechanism if regrouped is None else regrouped, q, v)

@@ -12,10 +12,18 @@ import pytest
 import dynx
 from dynx.compiled.contact_step import contact_step_text
 from dynx.compiled.step import compiled
-from dynx.errors import UnknownNameError, UnsupportedFeatureError
+from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
 from dynx.rbd.constraints import ConstraintSets, Disk, displacement_velocity, opening_velocity, solve
-from dynx.rbd.contact_step import ServoJoints, SpheresOnPlane, Sweeps, contact_step
+from dynx.rbd.contact_step import (
+    LEVEL,
+    Axes,
+    ServoJoints,
+    ShapesOnPlane,
+    Sweeps,
+    contact_step,
+    spheres_on_plane,
+)
 from dynx.rbd.displacement import floating_displacement, floating_end_velocity
 from dynx.spatial.scalar import Floats
 from tests.rbd.exact import exact_mechanism, exactly, fifty_digits
@@ -38,8 +46,12 @@ def a1() -> Model:
 
 
 def text_of(model: Model, **options: Any) -> Any:
-    given = {"h": H, "kp": KP, "kd": KD, "friction": FRICTION, **options}
-    return contact_step_text(model, dict.fromkeys(FEET, RADIUS), **given)
+    plane = options.pop("axes", LEVEL)
+    return contact_step_text(model, feet(model, plane), **{"h": H, "kp": KP, "kd": KD, **options})
+
+
+def feet(model: Model, axes: Axes = LEVEL) -> ShapesOnPlane:
+    return spheres_on_plane({model.frame_index(foot): RADIUS for foot in FEET}, FRICTION, axes)
 
 
 def states(n: int, seed: int = 0) -> tuple[Floats, Floats, Floats, Floats]:
@@ -116,7 +128,7 @@ def test_floats_and_fifty_digits_agree_with_the_kernel() -> None:
     on_floats = text.function(**dict(zip(names, (each[0] for each in given), strict=True)))
     for mine, wanted in zip(found, on_floats.values(), strict=True):
         np.testing.assert_allclose(mine[0], np.asarray(wanted, dtype=float), rtol=0.0, atol=1e-9)
-    touching = SpheresOnPlane(tuple(map(model.frame_index, FEET)), (RADIUS,) * 4, FRICTION)
+    touching = feet(model)
     zero = np.zeros(12)
     joints = ServoJoints(np.full(12, KP), np.full(12, KD), zero, zero)
     with fifty_digits():
@@ -216,8 +228,8 @@ def test_a_box_slides_in_any_direction_and_stops() -> None:
         ends = f"<parent link='box'/><child link='c{number}'/><origin xyz='{x} {y} -0.05'/>"
         parts.append(f"<link name='c{number}'/><joint name='j{number}' type='fixed'>{ends}</joint>")
     model = dynx.load(f"<robot name='box'>{''.join(parts)}</robot>", base="floating")
-    corners = {f"c{number}": 0.01 for number in range(4)}
-    kernel = compiled(contact_step_text(model, corners, h=H, kp=0.0, kd=0.0, friction=mu))
+    corners = spheres_on_plane({model.frame_index(f"c{number}"): 0.01 for number in range(4)}, mu)
+    kernel = compiled(contact_step_text(model, corners, h=H, kp=0.0, kd=0.0))
     start = np.tile(model.neutral(), (8, 1))
     start[:, 2] = 0.06
     v = np.zeros((8, 6))
@@ -243,7 +255,8 @@ def test_a_fixed_base_and_prismatic_joints() -> None:
         "<limit lower='-9' upper='9' effort='9' velocity='9'/></joint>"
     )
     model = dynx.load(f"<robot name='slider'><link name='base'/>{ball}{slide}</robot>")
-    kernel = compiled(contact_step_text(model, {"ball": 0.1}, h=H, kp=0.0, kd=0.0, friction=0.5))
+    touching = spheres_on_plane({model.frame_index("ball"): 0.1}, 0.5)
+    kernel = compiled(contact_step_text(model, touching, h=H, kp=0.0, kd=0.0))
     state = [np.array([[0.15]]), np.zeros((1, 1)), np.zeros((1, 3))]
     for step in range(200):
         *state, residual = steps(kernel, state[0], state[1], np.zeros((1, 1)), state[2])
@@ -256,6 +269,4 @@ def test_a_fixed_base_and_prismatic_joints() -> None:
 
 def test_robots_that_the_step_lacks_are_refused_by_name() -> None:
     with pytest.raises(UnsupportedFeatureError, match="mimic joints"):
-        contact_step_text(dynx.load("panda"), {"panda_hand": 0.1}, h=H, kp=1.0, kd=1.0, friction=0.5)
-    with pytest.raises(UnknownNameError, match="FR_foot"):
-        contact_step_text(a1(), {"FR_fot": 0.1}, h=H, kp=1.0, kd=1.0, friction=0.5)
+        contact_step_text(dynx.load("panda"), ShapesOnPlane(()), h=H, kp=1.0, kd=1.0)
