@@ -38,7 +38,7 @@ def configuration_differences(
 ) -> Iterator[Attribute]:
     """Yield the named configurations that differ, that one description has alone, or that have other names;
     nothing where a description leaves them open. Joints without counterpart are not compared."""
-    rules = _Configurations(ours, theirs, found, tolerance)
+    rules = _CommonCoordinates(ours, theirs, found, tolerance)
     for one, two, equal in rules.pairs():
         at, by_base = list[str](), False
         if one is not None and two is not None:
@@ -63,11 +63,11 @@ def configuration_pairs(
     mine, other = (
         {each.name: each for each in model.stated_configurations or ()} for model in (ours, theirs)
     )
-    for one, two, equal in _Configurations(ours, theirs, found, tolerance).pairs():
+    for one, two, equal in _CommonCoordinates(ours, theirs, found, tolerance).pairs():
         yield None if one is None else mine[one.name], None if two is None else other[two.name], equal
 
 
-class _Configurations:
+class _CommonCoordinates:
     """The named configurations of two robots, in the coordinates of the first."""
 
     def __init__(self, ours: Model, theirs: Model, found: Fit, tolerance: float) -> None:
