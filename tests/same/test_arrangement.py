@@ -62,11 +62,12 @@ def test_frames_of_a_robot_without_a_heavy_base_may_be_moved(case: str) -> None:
             assert all(each.sign == 1 for each in report.coordinates)
 
 
+HINGE: Part = (1, "revolute", POINT)
 LIKE: dict[str, list[Part]] = {
     "hinges": [(0, "revolute", None)] * 3,
     "slides": [(0, "prismatic", POINT)] * 3,
     "hinges of bodies": [(0, "continuous", BODY)] * 4,
-    "hinges on a slide": [(0, "prismatic", None), *[(1, "revolute", POINT)] * 3],
+    "hinges on a slide": [(0, "prismatic", None), *[HINGE] * 3],
 }
 
 
