@@ -154,8 +154,8 @@ The reports on the files of `unseen` had three faults. dynx no longer has these 
 
 
 FIGURES_HEAD = f"""\
-A row counts files of one part, examined with one base. Ten of the listed files have no results, and no
-row counts them: four of part A and six of part B. The rows of part A do not count the 178 moved files.
+A row counts files of one part, examined with one base. The rows do not count ten files without results:
+four of part A and six of part B. The rows of part A do not count the 178 moved files.
 The files were mended without a tolerance: dynx removed all effects above 1e-12.
 
 | column | meaning |
