@@ -43,7 +43,7 @@ file, with one exception (below).
   pointers. They contain malformed files.
 - **Part A was used in development.** 258 files are in part A by the hash.
 - **The exception.** 178 files of the other two parts also served in development, to count unknown
-  tags and refusals. dynx moved these files to part A. Four repositories have files in part A and in
+  tags and refusals. These files were moved to part A. Four repositories have files in part A and in
   another part, because only some of their files were moved.
 - **Parts B and C were unseen.** Before the measurement nobody opened these files, and the doctor
   did not run on them. Part B was measured before the last rules were written, and again afterwards.
@@ -112,9 +112,9 @@ On 29 November:
 | size of the changes, with `--tolerance 1e-12` | 24, 8, 12 | | 22, 10, 10 | |
 
 An empty cell means that this number was not measured. The printed calls were not measured on 29
-November. "All digits": the files of `unseen` were mended by `dynx.diagnose` without `fix_tolerance=`.
-This repair writes all digits of new numbers. Only the row with `--tolerance 1e-12` is about a
-repair with fewer digits.
+November. In the columns of `unseen`, the last row is about files that were mended with `--tolerance
+1e-12`. All other rows of these columns are about files that `dynx.diagnose` mended without
+`fix_tolerance=`. Their new numbers have all digits.
 
 On 30 November:
 
@@ -164,10 +164,11 @@ The files were mended without a tolerance: dynx removed all effects above 1e-12.
 | differ | files that an engine refuses, or loads with an error above 1e-12; in brackets, above {SMALL:g} |
 | unexplained | files with a difference that remains after dynx removed all causes |
 | failed | files whose examination failed |
-| alike without dynx | mended files that all engines load alike, of those that all load by the report |
+| alike without dynx | mended files that all engines load alike, of the mended files that all engines load |
 
 An error is relative to the reference values. For the last column, Pinocchio, PyBullet, MuJoCo and Drake
-load the mended files by the printed calls, in processes without dynx. *Alike* means that poses, mass
+load the mended files by the printed calls, in processes without dynx. The report says which mended files
+all engines load. *Alike* means that poses, mass
 matrices and torques differ by at most 1e-12. For a file without inertial data only poses are compared.
 MuJoCo refuses many of these files."""
 
