@@ -18,7 +18,7 @@ import numpy as np
 
 from dynx.model.mechanism import ROOT
 from dynx.same.limits import limit_differences
-from dynx.same.registration import candidates
+from dynx.same.registration import candidates, candidates_of_other_pairings
 from dynx.same.scales import extent, inertia_ratio
 from dynx.same.shapes import SHAPE_KINDS, matched_shapes
 from dynx.same.skeleton import Skeleton, are_alike, subtract, transformed
@@ -35,7 +35,7 @@ NEARLY = 0.1
 FRAMES_PER_JOINT = 12
 """Number of calls inside one another, at most, for each joint between the root and a tip."""
 
-MAX_CANDIDATES = 300
+MAX_CANDIDATES = 100
 """Largest number of candidates for the frame of one body."""
 
 MAX_BASES = 3
@@ -375,7 +375,10 @@ class Matching:
         yield from found
         if (a, b) in self._exhausted:
             return
-        for D in islice(candidates(self.ours, self.theirs, a, b), MAX_CANDIDATES):
+        for D in chain(
+            islice(candidates(self.ours, self.theirs, a, b), MAX_CANDIDATES),
+            candidates_of_other_pairings(self.ours, self.theirs, a, b),
+        ):
             if not any(float(np.max(np.abs(D - each))) < 1e-12 for each in found):
                 found.append(D)
                 yield D

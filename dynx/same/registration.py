@@ -53,7 +53,7 @@ def candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int, depth: int = 0)
     yield from _own_candidates(ours, theirs, a, b)
     free = is_free(ours, a)
     if free and depth == 0:
-        for pairs in _pairings(ours, theirs, a, b):
+        for pairs in islice(_pairings(ours, theirs, a, b), 1):
             yield from arrangements(ours, theirs, pairs)
     if depth >= MAX_DEPTH or (not free and depth == 0):
         # Only the frame of a floating root, or of a body on a ball joint, follows from no other.
@@ -64,6 +64,13 @@ def candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int, depth: int = 0)
         back = inverse(theirs.placements[j])
         for D in candidates(ours, theirs, i, j, depth + 1):
             yield ours.placements[i] @ D @ back
+
+
+def candidates_of_other_pairings(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterator[Floats]:
+    """Yield further candidates, for bodies whose joints may be paired otherwise than `candidates` has it."""
+    if is_free(ours, a):
+        for pairs in islice(_pairings(ours, theirs, a, b), 1, None):
+            yield from arrangements(ours, theirs, pairs)
 
 
 def _children(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> list[tuple[int, int]]:
