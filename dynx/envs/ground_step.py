@@ -100,6 +100,10 @@ class GroundMotion(RobotTask):
         """Return the impulses (m,) and the residual (1,)."""
         return state.memory[: self._impulses], state.memory[self._impulses : self._impulses + 1]
 
+    def require_start_options(self, options: Mapping[str, Any]) -> None:
+        """Raise UnknownNameError for an option of `reset` that the task does not take."""
+        self.task.require_start_options(options)
+
     def start(self, random: Array, **options: Any) -> State:
         """Return the state at the start of an episode."""
         first = self.task.initial_state(random, **options)

@@ -30,6 +30,7 @@ from dynx.errors import (
     nearest,
     shown,
 )
+from dynx.model.configuration import checked_q
 from dynx.model.numbers import DIVERGENCE_SPEED, checked_array, checked_seed, whole_number
 from dynx.simd.generators import Generators
 from dynx.simd.threads import checked_threads
@@ -169,8 +170,9 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         """Begin an episode of every environment in a state (num_envs, nq + nv + k), as `states` has them.
 
         A row is q [rad or m], v [rad/s or m/s] and the k numbers of memory of the task. The observation is
-        that of the next step. Raises EpisodeError before the first `reset`, ClosedError after `close`, and
-        ShapeError, DTypeError or NotFiniteError for an invalid array.
+        that of the next step. Raises EpisodeError before the first `reset`, ClosedError after `close`,
+        ShapeError, DTypeError or NotFiniteError for an invalid array, ArgumentError for a quaternion whose
+        length differs from 1 by more than 1e-6. The states are then unchanged.
         """
         self._refuse_closed()
         if not self._running:
@@ -178,8 +180,11 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         array = checked_array("states", states, self._layout.size)
         if array.shape != (self.num_envs, self._layout.size):
             raise ShapeError(f"states have shape {array.shape}; wanted {(self.num_envs, self._layout.size)}")
+        model = self.task.model
+        q = checked_q(model, array[:, : model.nq], "states")
         now = self._lanes.now
         now["state"][: self.num_envs] = array
+        now["state"][: self.num_envs, : model.nq] = q
         now["steps"][...] = 0.0
         self._ended = NONE_ENDED
         if self._variation is not None:

@@ -206,7 +206,8 @@ def checked_size(size: tuple[int, ...] | int) -> tuple[int, ...]:
 
 
 def checked_quaternion(name: str, quat_xyzw: Floats, part: str = "") -> Floats:
-    """Return unit quaternions (..., 4), normalised in a copy if a norm deviates by more than rounding.
+    """Return unit quaternions (..., 4); those whose norm deviates by more than rounding are normalised, in a
+    copy.
 
     Raises ArgumentError for a norm that differs from 1 by more than 1e-6; `part` is the index of the
     quaternion on the last axis of `name`.
@@ -222,7 +223,8 @@ def checked_quaternion(name: str, quat_xyzw: Floats, part: str = "") -> Floats:
             f"{name}{f'[{where}]' if where else ''} is a quaternion (x, y, z, w) of length "
             f"{float(norm[at][0]):.9g}; wanted length 1"
         )
-    return quat_xyzw / norm if np.any(off > UNIT_NORM_TOLERANCE) else quat_xyzw
+    rough = off > UNIT_NORM_TOLERANCE
+    return np.where(rough, quat_xyzw / norm, quat_xyzw) if np.any(rough) else quat_xyzw
 
 
 def checked_gravity(gravity: ArrayLike) -> tuple[float, float, float]:

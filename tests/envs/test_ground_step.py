@@ -16,7 +16,7 @@ from dynx.envs.runner import GroundEpisodes, WorldEpisodes
 from dynx.envs.tasks.stand import Stand
 from dynx.envs.tasks.walk import Walk
 from dynx.envs.vector import RobotVectorEnvironment
-from dynx.errors import ArgumentError, UnsupportedFeatureError
+from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
 from dynx.spatial.scalar import Floats
 
 DRAWN = {
@@ -88,6 +88,50 @@ def test_each_lane_is_the_single_environment(task: GroundTask, randomize: Mappin
         for mine, wanted in zip(found, seen[k], strict=True):
             assert np.array_equal(mine[0], wanted[0])
             assert mine[1:] == wanted[1:]
+
+
+@pytest.mark.parametrize(
+    ("task", "options"),
+    [
+        (Walk(contacts="feet"), {"velocity": (0.5, 0.0, -0.1), "disturbance": 0.1}),
+        (Stand(contacts="feet"), {"disturbance": 0.5}),
+    ],
+    ids=["Walk", "Stand"],
+)
+def test_a_reset_with_options_is_that_of_a_lane(task: GroundTask, options: dict[str, Any]) -> None:
+    actions = actions_of(5, 3)
+    with vector(task, 3) as envs, TaskEnvironment(task, "dynx") as env:
+        assert isinstance(env.episodes, GroundEpisodes)
+        for name in ("options", "velocty"):
+            for each in (env, envs):
+                with pytest.raises(UnknownNameError, match=f"{type(task).__name__} has no option '{name}'"):
+                    each.reset(seed=4, options={name: {}})
+        many = [envs.reset(seed=4, options=options)[0], *(envs.step(each)[0] for each in actions)]
+        one = [env.reset(seed=6, options=options)[0], *(env.step(each[2])[0] for each in actions)]
+    assert np.array_equal([each[2] for each in many], one)
+
+
+def test_states_need_unit_quaternions() -> None:
+    with vector(Walk(contacts="feet"), 9) as envs, vector(Walk(contacts="feet"), 9) as others:
+        for each in (envs, others):
+            each.reset(seed=0)
+        before = envs.states
+        for factor in (2.0, 0.0, 1.0 + 1e-5):
+            wrong = before.copy()
+            wrong[4, 3:7] *= factor
+            with pytest.raises(ArgumentError, match=r"states\[4, 3:7\] is a quaternion .* of length"):
+                envs.set_states(wrong)
+            assert np.array_equal(envs.states, before)
+        rounded = before.copy()
+        rounded[4, 3:7] *= 1.0 + 1e-9
+        envs.set_states(rounded)
+        others.set_states(before)
+        assert np.linalg.norm(envs.states[:, 3:7], axis=1) == pytest.approx(1.0, abs=1e-15)
+        (given,) = actions_of(1, 9)
+        rest = np.arange(9) != 4
+        found, wanted = envs.step(given)[0], others.step(given)[0]
+        assert np.array_equal(found[rest], wanted[rest])
+        np.testing.assert_allclose(found[4], wanted[4], rtol=0.0, atol=1e-5)
 
 
 def states_after(count: int, threads: int, rows: slice = slice(None)) -> Floats:
