@@ -4,14 +4,14 @@ frames, names, gravity. Such differences do not change the verdict."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from dynx.errors import DescriptionError
 from dynx.model import Model
-from dynx.model.elements import Joint, Link
+from dynx.model.elements import Joint, Limits, Link
 from dynx.model.geometry.links import ShapeNumber
 from dynx.model.mechanism import ROOT
 from dynx.model.xml.several_files import file_of_line
@@ -128,7 +128,7 @@ def _of_joint(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> Ite
     if mine.name != joint.name:
         yield Attribute("name", "joint", mine.name, joint.name, mine.name, joint.name, mine.line, joint.line)
     rows: list[tuple[Kind, float, float]] = [
-        *limit_pairs(mine.limits, joint.limits, each.sign),
+        *limit_pairs(_stated_limits(mine), _stated_limits(joint), each.sign),
         ("damping", mine.dynamics.damping, joint.dynamics.damping),
         ("friction", mine.dynamics.friction, joint.dynamics.friction),
         ("armature", mine.dynamics.armature, joint.dynamics.armature),
@@ -137,7 +137,8 @@ def _of_joint(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> Ite
     references = [dynamics.spring_reference for dynamics in (mine.dynamics, joint.dynamics)]
     if mine.dynamics.stiffness and joint.dynamics.stiffness:
         rows.append(("spring reference", references[0], each.sign * references[1]))
-    turns = _turns_of_ball(mine, joint, each, tolerance) if each.before is not None else {}
+    balls = mine.type == joint.type == "ball"
+    turns = _turns_of_ball(mine, joint, each, tolerance) if balls else {}
     for kind, first, second in rows:
         if differs(first, second, tolerance) or kind in turns:
             yield Attribute(
@@ -150,6 +151,11 @@ def _of_joint(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> Ite
                 mine.line,
                 joint.line,
             )
+
+
+def _stated_limits(joint: Joint) -> Limits:
+    """Return the limits of a joint; the angle of a ball joint counts from 0, which is no lower limit."""
+    return replace(joint.limits, lower=-np.inf) if joint.type == "ball" else joint.limits
 
 
 def _turns_of_ball(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> dict[Kind, str]:

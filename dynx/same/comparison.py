@@ -19,7 +19,7 @@ from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.same.attributes import Attribute, DescriptionFreedom, attributes, frame_differences, freedoms
 from dynx.same.bounds import bounds
-from dynx.same.configurations import configuration_differences
+from dynx.same.configurations import configuration_differences, joints_of_other_kinds
 from dynx.same.constraints import (
     compensation_differences,
     coupled_as,
@@ -187,7 +187,7 @@ def same_robot(
         unmatched=tuple(unmatched),
         attributes=tuple(apart),
         freedoms=tuple(free),
-        coordinates=_coordinates(analysis.fit),
+        coordinates=_coordinates(ours, theirs, analysis.fit),
         bounds=limits,
         T_first_second=rounded(root) if first.model.floating else None,
         notes=tuple(notes),
@@ -371,9 +371,10 @@ def _unseen_bodies(analysis: Analysis) -> frozenset[int]:
     return frozenset(each.ours for each in analysis.fit.bodies if each.theirs in numbers)
 
 
-def _coordinates(found: Fit) -> tuple[Coordinate, ...]:
-    ours, theirs = found.ours.model, found.theirs.model
-    mine, other = set(ours.joint_names), set(theirs.joint_names)
+def _coordinates(ours: Model, theirs: Model, found: Fit) -> tuple[Coordinate, ...]:
+    """Return the coordinates that correspond; those of joints whose types differ do not."""
+    mine = set(ours.joint_names)
+    other = set(theirs.joint_names) - joints_of_other_kinds(ours, theirs, found).keys()
     rows = []
     for each in found.bodies:
         if each.ours == ROOT:

@@ -12,6 +12,7 @@ from dynx.model.elements import NamedConfiguration, Pose
 from dynx.same.attributes import Attribute, Kind, listed, number_text
 from dynx.same.decimals import rounded
 from dynx.same.fit import Fit
+from dynx.same.skeleton import kind_of
 from dynx.same.stated import counterparts
 from dynx.same.text import pose_text, vector_text
 from dynx.spatial.scalar import Floats
@@ -24,11 +25,13 @@ ROTATION_ENTRIES = 4.0
 
 class _Configuration(NamedTuple):
     """A configuration: positions of our joints, rotations (3, 3) of ball joints, and the pose (4, 4) of our
-    base if it floats."""
+    base if it floats. `others` has the positions, in words, of joints whose counterparts are of another
+    type."""
 
     name: str
     positions: dict[str, float]
     rotations: dict[str, Floats]
+    others: dict[str, str]
     T_world_base: Floats | None
     line: int | None
 
@@ -37,7 +40,9 @@ def configuration_differences(
     ours: Model, theirs: Model, found: Fit, tolerance: float
 ) -> Iterator[Attribute]:
     """Yield the named configurations that differ, that one description has alone, or that have other names;
-    nothing where a description leaves them open. Joints without counterpart are not compared."""
+    nothing where a description leaves them open. Joints without counterpart are not compared. A position of a
+    joint differs from that of a joint of another type.
+    """
     rules = _CommonCoordinates(ours, theirs, found, tolerance)
     for one, two, equal in rules.pairs():
         at, by_base = list[str](), False
@@ -67,6 +72,19 @@ def configuration_pairs(
         yield None if one is None else mine[one.name], None if two is None else other[two.name], equal
 
 
+def joints_of_other_kinds(ours: Model, theirs: Model, found: Fit) -> dict[str, str | None]:
+    """Return the joints of `theirs` that are of another type than their counterparts in `ours`, with the
+    names of these; None for a fixed one."""
+    names: dict[str, str | None] = {}
+    for each in found.bodies[1:]:
+        one, two = found.ours.joints[each.ours].name, found.theirs.joints[each.theirs].name
+        if kind_of(ours.joint(one)) != kind_of(theirs.joint(two)):
+            names[two] = one
+    # One that is to be fixed has no body of its own.
+    fixed = (name for name in theirs.joint_names if not found.theirs.model.joint(name).moves)
+    return names | dict.fromkeys(fixed)
+
+
 class _CommonCoordinates:
     """The named configurations of two robots, in the coordinates of the first."""
 
@@ -81,7 +99,9 @@ class _CommonCoordinates:
             (each, found.ours.joints[each.ours].name, found.theirs.joints[each.theirs].name)
             for each in found.bodies[1:]
         ]
+        other_kinds = joints_of_other_kinds(ours, theirs, found)
         joints = [row for row in joints if row[1] in ours.joint_names and row[2] in theirs.joint_names]
+        joints = [row for row in joints if row[2] not in other_kinds]
         balls = [row for row in joints if row[0].before is not None]
         joints = [row for row in joints if row[0].before is None]
         D = rounded(found.bodies[0].D)
@@ -90,6 +110,7 @@ class _CommonCoordinates:
                 each.name,
                 {one: float(q[ours.position_index(one)]) for _, one, _ in joints},
                 {one: _rotation(ours, q, one) for _, one, _ in balls},
+                {one or two: _position_text(ours, q, one) for two, one in other_kinds.items()},
                 _base(q) if ours.floating else None,
                 each.line,
             )
@@ -101,6 +122,7 @@ class _CommonCoordinates:
                 each.name,
                 {one: fit.sign * float(q[theirs.position_index(two)]) for fit, one, two in joints},
                 {one: fit.turns[0] @ _rotation(theirs, q, two) @ fit.turns[1] for fit, one, two in balls},
+                {one or two: _position_text(theirs, q, two) for two, one in other_kinds.items()},
                 _base(q) @ inverse(D) if theirs.floating else None,
                 each.line,
             )
@@ -115,15 +137,19 @@ class _CommonCoordinates:
     def changed(self, a: _Configuration, b: _Configuration) -> list[str]:
         """Return the names of the joints whose positions differ."""
         tolerance, joint = self._tolerance, self._ours.joint
-        return [
-            name
-            for name, x in a.positions.items()
-            if abs(x - b.positions[name]) > tolerance * (self._reach if joint(name).unit == "m" else 1.0)
-        ] + [
-            name
-            for name, R in a.rotations.items()
-            if np.abs(R - b.rotations[name]).max() > ROTATION_ENTRIES * tolerance
-        ]
+        return (
+            [
+                name
+                for name, x in a.positions.items()
+                if abs(x - b.positions[name]) > tolerance * (self._reach if joint(name).unit == "m" else 1.0)
+            ]
+            + [
+                name
+                for name, R in a.rotations.items()
+                if np.abs(R - b.rotations[name]).max() > ROTATION_ENTRIES * tolerance
+            ]
+            + list(a.others)
+        )
 
     def base_differs(self, a: _Configuration, b: _Configuration) -> bool:
         """Check whether the poses of floating bases differ."""
@@ -143,6 +169,16 @@ def _rotation(model: Model, q: Floats, ball: str) -> Floats:
     return rotation_from_quat(q[first : first + 4])
 
 
+def _position_text(model: Model, q: Floats, name: str | None) -> str:
+    """Write the position of a joint with its unit, or that it has none."""
+    if name is None or name not in model.joint_names:
+        return "fixed" if name is None or not model.joint(name).moves else "follows another joint"
+    joint = model.joint(name)
+    if joint.type == "ball":
+        return vector_text(quat_from_rotation(_rotation(model, q, name)), 9)
+    return f"{number_text(float(q[model.position_index(name)]))} {joint.unit}"
+
+
 def _base(q: Floats) -> Floats:
     return homogeneous(rotation_from_quat(q[3:7]), q[:3])
 
@@ -150,12 +186,10 @@ def _base(q: Floats) -> Floats:
 def _text(configuration: _Configuration, joints: list[str], base: bool) -> str:
     """Write the positions that differ, in the coordinates of our robot."""
     positions, rotations = configuration.positions, configuration.rotations
-    words = [
-        f"{name} {number_text(positions[name])}"
-        if name in positions
-        else f"{name} {vector_text(quat_from_rotation(rotations[name]), 9)}"
-        for name in joints
-    ]
+    texts = {name: number_text(x) for name, x in positions.items()}
+    texts |= {name: vector_text(quat_from_rotation(R), 9) for name, R in rotations.items()}
+    texts |= configuration.others
+    words = [f"{name} {texts[name]}" for name in joints]
     if base and configuration.T_world_base is not None:
         words.insert(0, f"base {pose_text(Pose.from_matrix(configuration.T_world_base))}")
     return listed(words) if words else "stated"

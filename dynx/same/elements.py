@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from dynx.model import Model
-from dynx.model.elements import Inertial, Joint, Link, Pose, Vector
+from dynx.model.elements import Inertial, Joint, Link, NamedConfiguration, Pose, Vector
 from dynx.model.mechanism import ROOT, pose_arrays
 from dynx.model.topology import resolve_mimics
 from dynx.same.decimals import decimals, fifty_digits, rounded
@@ -23,7 +23,7 @@ from dynx.same.matching import UNCHANGED, BodyPair, Matching, MatchingPlan
 from dynx.same.observability import observability_of
 from dynx.same.registration import principal_frames
 from dynx.same.scales import inertia_ratio
-from dynx.same.skeleton import Skeleton, are_alike, float_inertia, subtract, transformed
+from dynx.same.skeleton import Skeleton, are_alike, float_inertia, kind_of, subtract, transformed
 from dynx.same.text import inertial_text, pose_text, vector_text
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
@@ -126,7 +126,24 @@ def apply(model: Model, changes: Iterable[FieldChange]) -> Model:
             links[change.name] = replace(links[change.name], **{change.field: change.value})
     # Joints may follow one that has become fixed.
     ordered = resolve_mimics(list(joints.values()), [], model.source) if retyped else list(joints.values())
-    return replace(model, joints=tuple(ordered), links=tuple(links.values()))
+    changed = replace(model, joints=tuple(ordered), links=tuple(links.values()))
+    other = {name for name, joint in joints.items() if kind_of(joint) != kind_of(model.joint(name))}
+    return _without_positions(changed, other) if other else changed
+
+
+def _without_positions(model: Model, joints: set[str]) -> Model:
+    """Return the model in which no configuration states a position of some joints: that of another type of
+    joint."""
+
+    def kept(each: NamedConfiguration) -> NamedConfiguration:
+        return replace(each, positions=tuple(row for row in each.positions if row[0] not in joints))
+
+    stated, initial = model.stated_configurations, model.stated_initial
+    return replace(
+        model,
+        stated_configurations=None if stated is None else tuple(map(kept, stated)),
+        stated_initial=None if initial is None else kept(initial),
+    )
 
 
 def analyse(ours: Skeleton, theirs: Model, tolerance: float) -> Analysis:
@@ -327,7 +344,7 @@ def _other_types(ours: Model, theirs: Model) -> Iterator[DifferingElement]:
     drivers = set(theirs.joint_names)
     for joint in theirs.joints:
         other = mine.get(joint.name)
-        if other is None or _kind(other) == _kind(joint):
+        if other is None or kind_of(other) == kind_of(joint):
             continue
         changes = [FieldChange("joint", joint.name, "type", other.type)]
         if other.moves:
@@ -361,10 +378,6 @@ def _named_counterparts(ours: Model, theirs: Model) -> dict[str, Joint]:
     children = {joint.child: joint for joint in ours.joints if joint.name not in names}
     pairs = ((joint.name, mine.get(joint.name, children.get(joint.child))) for joint in theirs.joints)
     return {name: joint for name, joint in pairs if joint is not None}
-
-
-def _kind(joint: Joint) -> str:
-    return "revolute" if joint.type == "continuous" else joint.type
 
 
 def _of_joints(found: Fit, tolerance: float) -> Iterator[DifferingElement]:

@@ -33,6 +33,11 @@ def without_standing_mimics(model: Model) -> Model:
     return replace(model, joints=joints, base_pose=IDENTITY)
 
 
+def kind_of(joint: Joint) -> str:
+    """Return the type of a joint; one with limits and one without are of one kind."""
+    return "revolute" if joint.type == "continuous" else joint.type
+
+
 def exact_skeleton(model: Model) -> Skeleton:
     """Build the skeleton of a model in 50 digits."""
     with fifty_digits():

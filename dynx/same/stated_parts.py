@@ -15,7 +15,7 @@ from dynx.model.equalities import StatedEquality
 from dynx.model.mjcf.sensor_objects import WORLD
 from dynx.model.tendons import StatedTendon
 from dynx.same.attributes import StatedEffect
-from dynx.same.configurations import configuration_pairs
+from dynx.same.configurations import configuration_pairs, joints_of_other_kinds
 from dynx.same.constraints import equality_pairs, tendon_pairs_compared
 from dynx.same.decimals import decimals, rounded
 from dynx.same.effects import SEED, STATES
@@ -31,11 +31,15 @@ StatedPart = StatedTendon | StatedEquality | NamedConfiguration
 
 @dataclass(frozen=True)
 class StatedChange:
-    """A part `old` of the second robot, None if it has none, and what it is to be; None: not there."""
+    """A part `old` of the second robot, None if it has none, and what it is to be; None: not there.
+
+    `other_types` tells that the part states positions of joints whose types differ.
+    """
 
     section: Section
     old: StatedPart | None
     new: StatedPart | None
+    other_types: bool = False
 
     @property
     def words(self) -> str:
@@ -53,6 +57,8 @@ class StatedParts:
         fits = [each for each in found.bodies if each.ours >= 0]
         self._fits = {found.ours.joints[each.ours].name: each for each in fits}
         self._names = {mine: found.theirs.joints[each.theirs].name for mine, each in self._fits.items()}
+        self._other_kinds = joints_of_other_kinds(ours, theirs, found)
+        self._coupled = {mine: name for mine, name in self._names.items() if name not in self._other_kinds}
         self._places = Places(ours, theirs, found)
 
     def changes(self) -> Iterator[StatedChange | str]:
@@ -82,19 +88,19 @@ class StatedParts:
             )
         if new is not None and old is not None:
             new = replace(new, name=old.name, line=old.line)
-        return StatedChange(section, old, new)
+        return StatedChange(section, old, new, section == "keyframe" and bool(self._other_kinds))
 
     # -- what the second robot is to state ----------------------------------------------------------------
 
     def _tendon(self, mine: StatedTendon) -> StatedTendon | None:
-        if any(joint not in self._names for joint in mine.joints):
+        if any(joint not in self._coupled for joint in mine.joints):
             return None
         terms = tuple((self._names[joint], self._fits[joint].sign * factor) for joint, factor in mine.terms)
         return replace(mine, terms=terms)
 
     def _equality(self, mine: StatedEquality) -> StatedEquality | None:
         if mine.type in ("joint", "tendon"):
-            names = self._names if mine.type == "joint" else self._tendons
+            names = self._coupled if mine.type == "joint" else self._tendons
             if any(each not in names for each in mine.objects):
                 return None
             signs = [self._fits[each].sign if mine.type == "joint" else 1 for each in mine.objects] + [1]
@@ -147,28 +153,34 @@ class StatedParts:
         return skeleton.model.links[number].name, rounded(back @ T)
 
     def _configuration(self, mine: NamedConfiguration) -> NamedConfiguration:
+        """Return a configuration of the first robot in the joints of the second, with the types of the
+        first."""
         theirs = self._theirs
-        q, other = self._ours.configurations[mine.name], theirs.neutral()
+        q, neutral = self._ours.configurations[mine.name], theirs.neutral()
+        other: dict[str, Floats] = {}
+        for name in theirs.joint_names:
+            if name not in self._other_kinds:
+                j = theirs.position_index(name)
+                other[name] = neutral[j : j + (4 if theirs.joint(name).type == "ball" else 1)]
         for joint, name in self._names.items():
-            if joint not in self._ours.joint_names or name not in theirs.joint_names:
+            if joint not in self._ours.joint_names or (name not in other and name not in self._other_kinds):
                 continue
-            each, i, j = self._fits[joint], self._ours.position_index(joint), theirs.position_index(name)
+            each, i = self._fits[joint], self._ours.position_index(joint)
             if each.before is None:
-                other[j] = each.sign * q[i]
+                other[name] = each.sign * q[i : i + 1]
             else:
                 before, after = each.turns
-                R = before.T @ rotation_from_quat(q[i : i + 4]) @ after.T
-                other[j : j + 4] = quat_from_rotation(R)
+                other[name] = quat_from_rotation(before.T @ rotation_from_quat(q[i : i + 4]) @ after.T)
         base = None
         if theirs.floating and self._ours.floating:
             T = homogeneous(rotation_from_quat(q[3:7]), q[:3]) @ rounded(self._found.bodies[0].D)
             base = (*T[:3, 3].tolist(), *quat_from_rotation(T[:3, :3]).tolist())
-        positions = []
-        for part in (each for each in theirs.joints if each.name in theirs.joint_names):
-            start = theirs.position_index(part.name)
-            numbers = other[start : start + (4 if part.type == "ball" else 1)] + 0.0
-            positions.append((part.name, tuple(numbers.tolist())))
-        return NamedConfiguration(mine.name, tuple(positions), base)
+        positions = tuple(
+            (part.name, tuple((other[part.name] + 0.0).tolist()))
+            for part in theirs.joints
+            if part.name in other
+        )
+        return NamedConfiguration(mine.name, positions, base)
 
 
 def changed_model(theirs: Model, changes: Iterable[StatedChange]) -> Model:
@@ -183,7 +195,10 @@ def changed_model(theirs: Model, changes: Iterable[StatedChange]) -> Model:
         if each.old is None:
             own += [each.new] if each.new is not None else []
         else:
-            at = next(k for k, part in enumerate(own) if part is each.old or part == each.old)
+            # A joint of another type has lost its positions in `theirs`, so that names tell configurations.
+            by_name = each.section == "keyframe"
+            old = each.old
+            at = next(k for k, part in enumerate(own) if part == old or (by_name and part.name == old.name))
             own[at : at + 1] = [] if each.new is None else [each.new]
     return replace(
         theirs,
@@ -200,13 +215,14 @@ def changed_model(theirs: Model, changes: Iterable[StatedChange]) -> Model:
 
 def effects_of(change: StatedChange, theirs: Model) -> tuple[StatedEffect, ...]:
     """Return the effects of a part of the second robot that differs: over random states within its limits, or
-    at the configuration. There is none of a part that one robot has alone."""
+    at the configuration. There is none of a part that one robot has alone, and of positions of joints whose
+    types differ."""
     old, new = change.old, change.new
     if isinstance(old, StatedTendon) and isinstance(new, StatedTendon):
         return _effects_of_tendon(old, new, theirs)
     if isinstance(old, StatedEquality) and isinstance(new, StatedEquality):
         return _effects_of_equality(old, new, theirs)
-    if isinstance(old, NamedConfiguration) and isinstance(new, NamedConfiguration):
+    if isinstance(old, NamedConfiguration) and isinstance(new, NamedConfiguration) and not change.other_types:
         return _effects_of_configuration(old, new, theirs)
     return ()
 
