@@ -14,7 +14,7 @@ from dynx.envs.environment import TaskEnvironment
 from dynx.envs.ground_task import KERNEL_ENGINE, GroundTask
 from dynx.envs.library import AutoresetMode, register, registry
 from dynx.envs.randomization import Randomization
-from dynx.envs.task import RobotTask, Task
+from dynx.envs.task import RobotTask, Task, checked_engine
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 
 if TYPE_CHECKING:
@@ -168,6 +168,8 @@ def make_vector_environment(
 
     made = task_class(task).with_options(options)
     wanted = kernel_engine(type(made))
+    if engine is not None:
+        checked_engine(type(made), engine)
     if wanted is None or engine not in (None, wanted):
         subject = type(made).__name__ if wanted is None else f"engine {shown(engine)}"
         one = "of one robot" if wanted is None else "such as this one"

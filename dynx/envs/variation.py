@@ -186,8 +186,8 @@ class VariedGround(VariedRobot):
     def _refuse_other_fields(self, task: RobotTask, randomization: Randomization) -> None:
         if randomization.delay is not None:
             raise UnsupportedFeatureError(
-                f"kernels of {type(task).__name__} do not have delay; with vectorization_mode='sync' and "
-                "another engine each environment steps in a world, which has it"
+                f"kernels of {type(task).__name__} do not have delay, which worlds have: wanted another "
+                "engine, or for Stand and Walk contacts='all'"
             )
 
     def draws(self, *fields: str) -> bool:

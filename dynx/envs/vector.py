@@ -38,6 +38,8 @@ from dynx.spatial.scalar import Floats
 
 RENDER_MODES = ("rgb_array",)
 
+IN_WORLDS = "with vectorization_mode='sync' or 'async' environments step in worlds"
+
 NONE_ENDED = np.zeros(0, dtype=np.intp)
 """Numbers of the environments whose episode ended, where there are none."""
 
@@ -125,9 +127,15 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         self._task_step: TaskStep
         varied: VariedRobot
         if isinstance(task, GroundTask):
-            contacts = GroundContacts.of(task, joints)
+            try:
+                contacts = GroundContacts.of(task, joints)
+            except UnsupportedFeatureError as error:
+                raise UnsupportedFeatureError(f"{error}; {IN_WORLDS}, which keep all contacts") from None
             motion = motion_of(task, contacts)
-            varied = VariedGround(motion, drawn, joints, contacts.surfaces)
+            try:
+                varied = VariedGround(motion, drawn, joints, contacts.surfaces)
+            except UnsupportedFeatureError as error:
+                raise UnsupportedFeatureError(f"{error}; then {IN_WORLDS}") from None
             self._task_step = GroundStep(motion, contacts, varied)
         else:
             varied = VariedRobot(task, drawn, joints)

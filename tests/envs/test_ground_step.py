@@ -13,6 +13,7 @@ from dynx.envs.environment import TaskEnvironment
 from dynx.envs.ground_step import SWEEPS
 from dynx.envs.ground_task import GroundTask
 from dynx.envs.runner import GroundEpisodes, WorldEpisodes
+from dynx.envs.task import State
 from dynx.envs.tasks.stand import Stand
 from dynx.envs.tasks.walk import Walk
 from dynx.envs.vector import RobotVectorEnvironment
@@ -171,6 +172,32 @@ def test_the_kernel_moves_as_the_world_does_in_small_steps() -> None:
     np.testing.assert_allclose(observed[0], observed[1], rtol=0.0, atol=2e-3)
 
 
+@pytest.mark.parametrize(("kind", "largest"), [(Walk, 0.1), (Fine, 1e-3)])
+def test_motors_of_kernels_and_worlds_differ_in_long_steps(kind: type[Walk], largest: float) -> None:
+    """In free flight [rad/s and m/s]: a world's motor takes the forces of the step before."""
+    task = kind(contacts="feet")
+    found: list[list[Floats]] = [[], []]
+    with TaskEnvironment(task, "dynx") as env, TaskEnvironment(task, "dynx") as other:
+        other.episodes.close()
+        other._episodes = in_world = WorldEpisodes(task, "dynx")
+        in_kernel = env.episodes
+        assert isinstance(in_kernel, GroundEpisodes)
+        (name,) = in_world.world.state.robots
+        for seed, action in enumerate(actions_of(3, 1)[:, 0]):
+            env.reset(seed=seed)
+            other.reset(seed=seed)
+            q, v, memory = in_kernel.state
+            q[2] += 1.0
+            in_kernel.state = State(q, v, memory)
+            in_world.world.set_state(robots={name: (q, v)})
+            env.step(action)
+            other.step(action)
+            found[0].append(in_kernel.state.v)
+            found[1].append(in_world.world.state.robots[name].v)
+    np.testing.assert_allclose(found[0], found[1], rtol=0.0, atol=largest)
+    assert not np.allclose(found[0], found[1], rtol=0.0, atol=0.01 * largest)
+
+
 def test_joints_stop_at_their_limits() -> None:
     """A lane in which a joint reaches a stop is stepped with stops, and ends within them."""
     with (
@@ -247,9 +274,9 @@ class Remembering(Walk):
 
 def test_what_kernels_do_not_have_is_refused_by_name() -> None:
     refused: list[tuple[GroundTask, dict[str, Any], str]] = [
-        (Walk(), {}, "at most 16"),
+        (Walk(), {}, "at most 16.*contacts='feet'.*vectorization_mode='sync' or 'async'"),
         (Remembering(contacts="feet"), {}, "Remembering has a method info of its own"),
-        (Walk(contacts="feet"), {"randomize": {"delay": 0.02}}, "do not have delay"),
+        (Walk(contacts="feet"), {"randomize": {"delay": 0.02}}, "do not have delay.*contacts='all'.*'sync'"),
         (
             Walk(contacts="feet"),
             {"randomize": {"joint_friction": {"FR_hip_joint": 0.5}}, "joint_limits": False},
@@ -265,6 +292,16 @@ def test_what_kernels_do_not_have_is_refused_by_name() -> None:
         assert env.step(np.zeros(12))[-1]["time"] == pytest.approx(0.02)
     with pytest.raises(ArgumentError, match="known: all, feet"):
         Walk(contacts="foot")
+
+
+def test_a_single_environment_is_not_told_of_vectors() -> None:
+    """A delay needs a world, which ``contacts='all'`` gives on the same engine."""
+    randomize = {"delay": 0.02}
+    with pytest.raises(UnsupportedFeatureError, match=r"do not have delay.*contacts='all'$"):
+        TaskEnvironment(Walk(contacts="feet"), "dynx", randomize=randomize)
+    with TaskEnvironment(Walk(contacts="all"), "dynx", randomize=randomize) as env:
+        assert isinstance(env.episodes, WorldEpisodes)
+        assert env.reset(seed=0)[1]["parameters"] == {"delay": 0.02}
 
 
 def test_pictures_show_the_scene() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dynx.envs import make_environment
-from dynx.envs.registration import NAMESPACE, TASKS, is_of_dynx, task_class, task_id
+from dynx.envs.registration import NAMESPACE, TASKS, is_of_dynx, make_vector_environment, task_class, task_id
 from dynx.envs.task import RobotTask
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.errors import ArgumentError, UnknownNameError
@@ -128,3 +128,13 @@ def test_a_misspelt_hook_of_a_task_is_refused(name: str, value: Any, hook: str) 
     # A class that also has the hook means what it says, as does a short name or one of its own.
     task_class(type("Own", (Bare,), {name: value, hook: getattr(RobotTask, hook)}))
     task_class(type("Own", (Bare,), {"settled": True, "_" + name: value, "bonus": 1.0}))
+
+
+@pytest.mark.parametrize(
+    ("name", "engine"), [("Stand", "compiled"), ("Push", "compiled"), ("CartPole", "dynx")]
+)
+def test_a_vector_on_an_engine_that_does_not_run_the_task_names_those_that_do(name: str, engine: str) -> None:
+    with pytest.raises(ArgumentError, match=f"^{name} does not run on engine '{engine}'; known: "):
+        make_vector_environment(name, 2, engine)
+    with pytest.raises(ArgumentError, match="'mujoco' does not step in a compiled kernel; wanted vector"):
+        make_vector_environment("Stand", 2, "mujoco")

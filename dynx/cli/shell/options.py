@@ -357,7 +357,8 @@ task_options = click.option(
     type=name_value,
     multiple=True,
     metavar="NAME=VALUE",
-    help="Option of the task, as gymnasium.make takes it; may be given several times.",
+    help="Option of the task, as gymnasium.make takes it; may be given several times. Stand and Walk on "
+    "engine dynx are more than 100 times faster with contacts=feet.",
 )
 
 
