@@ -128,19 +128,28 @@ def apply(model: Model, changes: Iterable[FieldChange]) -> Model:
     ordered = resolve_mimics(list(joints.values()), [], model.source) if retyped else list(joints.values())
     changed = replace(model, joints=tuple(ordered), links=tuple(links.values()))
     other = {name for name, joint in joints.items() if kind_of(joint) != kind_of(model.joint(name))}
-    return _without_positions(changed, other) if other else changed
+    return _without_data_of(changed, other) if other else changed
 
 
-def _without_positions(model: Model, joints: set[str]) -> Model:
-    """Return the model in which no configuration states a position of some joints: that of another type of
-    joint."""
+def _without_data_of(model: Model, joints: set[str]) -> Model:
+    """Return the model without what it states of other types of some joints: positions in configurations, and
+    tendons and couplings if the joint now has not one number."""
 
     def kept(each: NamedConfiguration) -> NamedConfiguration:
         return replace(each, positions=tuple(row for row in each.positions if row[0] not in joints))
 
     stated, initial = model.stated_configurations, model.stated_initial
+    others = {each for each in joints if kind_of(model.joint(each)) not in ("revolute", "prismatic")}
+    tendons = [each for each in model.tendons or () if others.isdisjoint(each.joints)]
+    left = {each.name for each in model.tendons or ()} - {each.name for each in tendons}
+    ends = {"joint": others, "tendon": left}
+    equalities = [
+        each for each in model.equalities or () if ends.get(each.object_type, set()).isdisjoint(each.objects)
+    ]
     return replace(
         model,
+        tendons=None if model.tendons is None else tuple(tendons),
+        equalities=None if model.equalities is None else tuple(equalities),
         stated_configurations=None if stated is None else tuple(map(kept, stated)),
         stated_initial=None if initial is None else kept(initial),
     )

@@ -192,14 +192,18 @@ def changed_model(theirs: Model, changes: Iterable[StatedChange]) -> Model:
     }
     for each in changes:
         own = parts[each.section]
-        if each.old is None:
-            own += [each.new] if each.new is not None else []
-        else:
-            # A joint of another type has lost its positions in `theirs`, so that names tell configurations.
-            by_name = each.section == "keyframe"
-            old = each.old
-            at = next(k for k, part in enumerate(own) if part == old or (by_name and part.name == old.name))
-            own[at : at + 1] = [] if each.new is None else [each.new]
+        old = each.old
+        # Where a joint has another type now, `theirs` may lack its positions, tendons and couplings: a
+        # configuration is found by its name, and a part that is not there is added.
+        at = next(
+            (
+                k
+                for k, part in enumerate(own)
+                if old is not None and (part == old or (each.section == "keyframe" and part.name == old.name))
+            ),
+            len(own),
+        )
+        own[at : at + 1] = [] if each.new is None else [each.new]
     return replace(
         theirs,
         tendons=tuple(each for each in parts["tendon"] if isinstance(each, StatedTendon)),
