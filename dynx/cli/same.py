@@ -85,6 +85,8 @@ def same(
         if fix is not None and report.same and report.mended_text is None:
             kept = " (other differences are not mended)" if report.attributes else ""
             out.print(f"nothing to mend{kept}: {one_line(fix)} is not written")
+        if fix is not None and report.mended_text is not None and not written[0]:
+            out.print(f"mended file: {one_line(fix)}")
         if known is not None:
             who = f"{one_line(report.first)} and {one_line(report.second)}"
             show_comparison(out, who, known.compare(report))

@@ -253,3 +253,22 @@ def test_json_and_annotations_need_two_outputs(changed: Path) -> None:
     result = run("ur5", changed, "--github", "--json")
     assert result.exit_code == 2
     assert "--github and --json -" in result.output
+
+
+def test_the_mended_file_is_named_also_if_the_robots_are_the_same(tmp_path: Path) -> None:
+    body = '<worldbody><body name="a"><joint name="j"/>INERTIAL</body></worldbody>'
+    body = body.replace("INERTIAL", '<inertial pos="0 0.1 0" mass="1" diaginertia="1 1 1"/>')
+    text = f'<mujoco>{body}<keyframe><key name="home" qpos="0.1"/></keyframe></mujoco>'
+    first, second, out = (tmp_path / name for name in ("first.xml", "second.xml", "mended.xml"))
+    first.write_text(text)
+    for other, code, written in (
+        (text, 0, False),
+        (text.replace('0.1"/></keyframe>', '0.2"/></keyframe>'), 0, True),
+        (text.replace('mass="1"', 'mass="2"'), 1, True),
+    ):
+        second.write_text(other)
+        result = run(first, second, "--fix", out)
+        assert result.exit_code == code
+        assert ("mended file: " in result.output) == written == out.exists()
+        assert ("is not written" in result.output) != written
+        out.unlink(missing_ok=True)
