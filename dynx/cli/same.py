@@ -74,6 +74,8 @@ def same(
     report = same_robot(first, second, base=base, tolerance=TOLERANCE if tolerance is None else tolerance)
     written = [] if fix is None else [failure_of(_write_mended, report, fix)]
     document = report.to_dict()
+    if fix is not None and report.mended_text is not None and not written[0]:
+        document["mended_file"] = fix
     written += outputs.write_texts(_texts(outputs, report, known, first, second, document))
     if github:
         _echo_annotations(report, known)
@@ -85,8 +87,8 @@ def same(
         if fix is not None and report.same and report.mended_text is None:
             kept = " (other differences are not mended)" if report.attributes else ""
             out.print(f"nothing to mend{kept}: {one_line(fix)} is not written")
-        if fix is not None and report.mended_text is not None and not written[0]:
-            out.print(f"mended file: {one_line(fix)}")
+        if document["mended_file"] is not None:
+            out.print(f"mended file: {one_line(document['mended_file'])}")
         if known is not None:
             who = f"{one_line(report.first)} and {one_line(report.second)}"
             show_comparison(out, who, known.compare(report))

@@ -170,19 +170,21 @@ class SameReport(_ReportFields):
                 **{
                     name: getattr(self, name)
                     for name in SameDocument.__dataclass_fields__
-                    if name not in ("schema", "dynx", "T_first_second")
+                    if name not in ("schema", "dynx", "T_first_second", "mended_file")
                 },
                 T_first_second=None if pose is None else tuple(map(tuple, pose.tolist())),
+                mended_file=None,
             ),
         )
 
 
 @dataclass(frozen=True)
 class SameDocument(_ReportFields):
-    """The JSON document of ``dynx same``."""
+    """The JSON document of ``dynx same``; `mended_file` is the file that ``--fix`` wrote."""
 
     verdict: str
     T_first_second: tuple[tuple[float, ...], ...] | None
+    mended_file: str | None
     schema: Literal["dynx.same/1"] = SCHEMA
     dynx: str = __version__
 

@@ -271,4 +271,6 @@ def test_the_mended_file_is_named_also_if_the_robots_are_the_same(tmp_path: Path
         assert result.exit_code == code
         assert ("mended file: " in result.output) == written == out.exists()
         assert ("is not written" in result.output) != written
+        document = json.loads(run(first, second, "--fix", out, "--json", "-").stdout)
+        assert document["mended_file"] == (str(out) if written else None)
         out.unlink(missing_ok=True)
