@@ -308,7 +308,9 @@ class _Mjcf:
             at = self._bodies.get(old.child)
             first = at is not None and not at.all("joint")
         if at is None or not first or at.parent is None or at.parent.tag not in ("body", "worldbody"):
-            raise NotMendedError(f"the place of joint {old.name} does not follow from one <body> alone")
+            # A fixed joint has no name in MJCF; its body has.
+            what = f"joint {old.name}" if old.moves else f"body {old.child}"
+            raise NotMendedError(f"the place of {what} does not follow from one <body> alone")
         body = self._placement(at)
         moved = new.origin.matrix @ np.linalg.inv(old.origin.matrix) @ body
         x, y, z, w = quat_from_rotation(moved[:3, :3]).tolist()

@@ -299,3 +299,10 @@ def test_the_place_of_a_joint_has_the_line_of_its_body() -> None:
     (each,) = same_robot(SDF, other).differences
     number = next(number for number, line in enumerate(SDF.splitlines(), 1) if '<link name="lower">' in line)
     assert (each.part, each.second_line) == ("origin", number)
+
+
+def test_the_reason_names_a_body_of_the_file() -> None:
+    ball = BODIES.replace('name="shoulder" axis="0 1 0" range="-1 1"', 'name="shoulder" type="ball"')
+    report = same_robot(ball, ball.replace('type="ball"', 'type="ball" pos="0 0.02 0"'))
+    assert report.mended_text is None
+    assert "the place of body upper " in str(report.not_mended)
