@@ -41,7 +41,7 @@ def random_inertial(rng: np.random.Generator) -> Inertial:
     points, masses = rng.uniform(-0.2, 0.2, (6, 3)), rng.uniform(0.1, 1.0, 6)
     center = masses @ points / masses.sum()
     off = points - center
-    tensor = np.einsum("k,kij->ij", masses, np.einsum("ki,ki,ij->kij", off, off, np.eye(3)))
+    tensor = np.einsum("k,kl,kl,ij->ij", masses, off, off, np.eye(3))
     tensor -= np.einsum("k,ki,kj->ij", masses, off, off)
     x, y, z = center.tolist()
     return inertial_of(float(masses.sum()), Pose((x, y, z)), tensor)

@@ -62,6 +62,11 @@ def shown(
     """Return the colours (height, width, 3), from 0 to 255, that a page shows, once they do not change."""
     page = open_page(viewer.url, accelerated=accelerated)
     connected(viewer)
+    # Before the page has all shapes it may rest, too.
+    names = [node.name for nodes in viewer.view.visuals.values() for node in nodes]
+    page.page.wait_for_function(
+        "names => names.every((name) => __viserMutable?.nodeRefFromName[name])", arg=names
+    )
     pictures = [by_page(viewer, camera)]
 
     def rests() -> bool:
