@@ -266,7 +266,7 @@ def test_a_delay_of_a_world_shifts_actions() -> None:
         episodes: Any = env.episodes
         for action in actions:
             env.step(action)
-        assert np.array_equal(episodes.episode.memory.action, actions[-3].astype(np.float64))
+        assert np.array_equal(episodes.episode.memory.numbers[:12], actions[-3].astype(np.float64))
 
 
 @pytest.mark.parametrize(
