@@ -13,8 +13,10 @@ that does not exist (`explains_names`).
 from __future__ import annotations
 
 import inspect
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
@@ -214,8 +216,30 @@ class ClassRegistry(Generic[Kind]):
         return kind
 
     def _entry_points(self) -> list[EntryPoint]:
-        points = () if self.group is None else entry_points(group=self.group)
+        points = () if self.group is None else installed_entry_points(self.group)
         return [point for point in points if point.name not in self.built_in]
+
+
+def installed_entry_points(group: str) -> tuple[EntryPoint, ...]:
+    """Return the entry points of a group.
+
+    Reading those of all packages takes tens of milliseconds. They are read again when a folder of imports is
+    added, removed or changed, as by an installation.
+    """
+    return _read_entry_points(group, tuple((folder, _changed(folder)) for folder in sys.path))
+
+
+@lru_cache(maxsize=16)
+def _read_entry_points(group: str, folders: tuple[tuple[str, int], ...]) -> tuple[EntryPoint, ...]:
+    return tuple(entry_points(group=group))
+
+
+def _changed(folder: str) -> int:
+    """Return the time at which a folder last changed [ns], or 0 if there is none."""
+    try:
+        return os.stat(folder or ".").st_mtime_ns
+    except OSError:
+        return 0
 
 
 def _provider(point: EntryPoint) -> str:

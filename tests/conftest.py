@@ -17,24 +17,18 @@ import os
 import tempfile
 from collections import defaultdict
 from collections.abc import Generator
-from functools import cache
-from importlib.metadata import entry_points
 from typing import Any
 from zlib import crc32
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
-from dynx import registry
 from dynx.errors import NotInstalledError, RobotNotFoundError
 from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
 
 EXAMPLES_INSTALLED = any(entry.source == EXAMPLE_ROBOT_DATA for entry in robots())
 
 needs_examples = pytest.mark.skipif(not EXAMPLES_INSTALLED, reason="needs example-robot-data")
-
-# Reading the entry points of all packages takes tens of milliseconds; none is installed during the tests.
-registry.entry_points = cache(entry_points)  # type: ignore[assignment, attr-defined]
 
 settings.register_profile(
     "ci",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from abc import ABC, abstractmethod
@@ -15,7 +16,7 @@ import pytest
 
 from dynx.backends import installed_backends
 from dynx.errors import ArgumentError, BackendError, UnknownBackendError
-from dynx.registry import ClassRegistry, door
+from dynx.registry import ClassRegistry, door, installed_entry_points
 
 
 class Tool(ABC):
@@ -187,3 +188,18 @@ def test_a_door_in_a_class_gives_the_class() -> None:
         for kind in (cranes[first], *cranes):
             assert kind.of_height(2.0) == (kind, 2.0)
             assert kind().of_height(2.0) == (kind, 2.0)
+
+
+def test_a_package_that_is_installed_while_the_program_runs_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    group = "acme.things"
+    assert installed_entry_points(group) == ()
+    metadata = tmp_path / "acme-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(f"[{group}]\nthing = acme:Thing\n")
+    # The folder has changed, though perhaps within the resolution of its time.
+    os.utime(tmp_path, ns=(0, tmp_path.stat().st_mtime_ns + 1))
+    assert [point.name for point in installed_entry_points(group)] == ["thing"]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.step import StepText
-from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
+from dynx.errors import ArgumentError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.geometry import Plane
@@ -27,8 +26,15 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.steppers.layout import WORLD, Layout, stop_positions
 from dynx.steppers.material import contact_material
 
-INPUTS = ("friction", "gravity", "kp", "kd", "max_torque")
-"""Numbers that may be inputs of the kernel."""
+
+def refuse_other_joints(model: Model) -> None:
+    """Raise UnsupportedFeatureError, naming the joint or robot, for ball joints and mimic joints, which the
+    step does not have."""
+    refuse_ball_joints(model, "a compiled step with contacts")
+    if model.mechanism.coupling is not None:
+        raise UnsupportedFeatureError(
+            f"{model.name} has mimic joints, which a compiled step with contacts does not have"
+        )
 
 
 def contact_step_text(
@@ -41,7 +47,6 @@ def contact_step_text(
     max_torque: Floats | float | None = None,
     sweeps: Sweeps | None = None,
     joint_limits: bool = False,
-    inputs: Sequence[str] = (),
 ) -> StepText:
     """Return the text of a step of `h` [s] for `dynx.compiled.step`.
 
@@ -52,21 +57,9 @@ def contact_step_text(
     is target (n joints,), another output residual (1,). Damping, dry friction, armature and springs of the
     joints are in the step.
 
-    Numbers named in `inputs` are inputs of the kernel instead of constants, so that they may differ from lane
-    to lane: "friction" (a coefficient for each shape), "gravity" (3,), "kp", "kd" and "max_torque"
-    (n joints,).
-
-    Raises UnsupportedFeatureError for a robot with mimic joints or ball joints, and ArgumentError for an
-    unknown input.
+    Raises UnsupportedFeatureError for a robot with mimic joints or ball joints.
     """
-    refuse_ball_joints(model, "a compiled step with contacts")
-    if model.mechanism.coupling is not None:
-        raise UnsupportedFeatureError(
-            f"{model.name} has mimic joints, which a compiled step with contacts lacks"
-        )
-    for name in inputs:
-        if name not in INPUTS:
-            raise ArgumentError(f"input {shown(name)} is unknown; wanted {' or '.join(INPUTS)}")
+    refuse_other_joints(model)
     dynamics = [joint.dynamics for joint in model.coordinate_joints]
     n = len(dynamics)
     mechanism = simplify_mechanism(model.mechanism)
@@ -90,19 +83,10 @@ def contact_step_text(
         "v": model.nv,
         "target": n,
         "impulses": 3 * sum(touching.counts) + len(joints.limited),
-        **{name: {"friction": len(touching.shapes), "gravity": 3}.get(name, n) for name in inputs},
     }
 
     def function(**arrays: Any) -> Mapping[str, Array]:
-        given = {name: arrays.pop(name) for name in inputs}
-        moved, fewer, rough = mechanism, regrouped, touching
-        if "gravity" in given:
-            gravity = given.pop("gravity")
-            moved, fewer = (replace(each, gravity=gravity) for each in (mechanism, regrouped))
-        if "friction" in given:
-            pairs = zip(touching.shapes, given.pop("friction"), strict=True)
-            rough = replace(touching, shapes=tuple(each._replace(friction=mu) for each, mu in pairs))
-        return contact_step(moved, replace(joints, **given), rough, bounds, h, **arrays, regrouped=fewer)
+        return contact_step(mechanism, joints, touching, bounds, h, **arrays, regrouped=regrouped)
 
     return StepText(function, sizes, "the step with contacts cannot be compiled", repeats=True)
 
@@ -156,7 +140,8 @@ def shapes_on_plane(layout: Layout, *, deepest: bool = False) -> ShapesOnPlane:
                 raise UnsupportedFeatureError(f"{own.name} cannot touch the ground: {error}") from None
             R = frame.R.T @ placed.T[:3, :3]
             p = frame.R.T @ (placed.T[:3, 3] - frame.p)
-            found.append(FramedShape(number, placed.shape, R, p, material.friction, deepest))
+            names = own.name.rpartition("/")[2], other.name
+            found.append(FramedShape(number, placed.shape, R, p, material.friction, deepest, names))
     if plane is None:
         return ShapesOnPlane(())
     axes = tuple(tuple(plane[:3, k].tolist()) for k in (2, 0, 1))

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.compiled.contact_step import shapes_on_plane
+from dynx.compiled.contact_step import refuse_other_joints, shapes_on_plane
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.step import BoundSteps, StepText, compiled
 from dynx.envs.ground_task import GroundTask
@@ -28,7 +28,6 @@ from dynx.envs.task_step import TaskLanes, TaskStep
 from dynx.envs.variation import VariedGround
 from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.rbd.base_parameters import regroup_inertias
 from dynx.rbd.contact_step import ServoJoints, ShapesOnPlane, Sweeps, contact_step
 from dynx.simd.kernel import Kernel
@@ -149,12 +148,10 @@ def motion_of(task: GroundTask, contacts: GroundContacts) -> GroundMotion:
 
 @dataclass(frozen=True)
 class GroundContacts:
-    """What touches in a scene that a kernel can step."""
+    """A scene that a kernel can step: one robot, and its shapes that may touch the ground."""
 
     layout: Layout
     touching: ShapesOnPlane
-    surfaces: tuple[tuple[str, str], ...]
-    """Link and ground of each shape."""
 
     @classmethod
     def of(cls, task: GroundTask, joints: JointOptions = DESCRIBED) -> GroundContacts:
@@ -173,23 +170,14 @@ class GroundContacts:
                 raise UnsupportedFeatureError(f"{body.name} moves; a kernel has one robot that moves")
         touching = shapes_on_plane(layout)
         model = layout.robots[0].model
-        refuse_ball_joints(model, "a kernel with contacts")
-        if model.mechanism.coupling is not None:
-            raise UnsupportedFeatureError(f"{model.name} has mimic joints, which a kernel does not have")
+        refuse_other_joints(model)
         points = sum(touching.counts)
         if points > MAX_POINTS:
             raise UnsupportedFeatureError(
                 f"{model.name} may touch the ground at {points} points; a kernel has at most {MAX_POINTS}; "
                 "with contacts='feet' only the feet of Stand and Walk touch it"
             )
-        surfaces = []
-        for i, j in np.argwhere(np.triu(layout.collides)):
-            ends = sorted(
-                (layout.colliders[i], layout.colliders[j]), key=lambda each: each.owner.robot is None
-            )
-            own, other = ends
-            surfaces += [(own.name.rpartition("/")[2], other.name)] * len(own.shapes)
-        return cls(layout, touching, tuple(surfaces))
+        return cls(layout, touching)
 
     @property
     def robot(self) -> RobotLayout:
@@ -305,8 +293,7 @@ class GroundStep(TaskStep):
         # Impulses of joints without a row in this step are 0 after it.
         kept = [*range(first), *(first + rows.index(joint) for joint in joints.limited)]
         shapes = tuple(
-            each._replace(friction=varied.friction(each.friction, surfaces, drawn))
-            for each, surfaces in zip(contacts.touching.shapes, contacts.surfaces, strict=True)
+            each._replace(friction=varied.friction(each, drawn)) for each in contacts.touching.shapes
         )
         result = contact_step(
             varied.mechanism(self._mechanism, drawn, masses=self._draws_masses),

@@ -284,7 +284,7 @@ class GroundEpisodes(CompiledEpisodes):
     def _open_lane(self) -> None:
         from dynx.envs.ground_step import GroundStep
 
-        varied = VariedGround(self._motion, self._randomization, self._joints, self._contacts.surfaces)
+        varied = VariedGround(self._motion, self._randomization, self._joints, self._contacts.touching.shapes)
         self._varied = varied
         self._use(GroundStep(self._motion, self._contacts, varied))
 

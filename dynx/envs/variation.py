@@ -25,7 +25,7 @@ from dynx.spatial.scalar import Array, Floats, sqrt
 from dynx.steppers.layout import stop_positions
 
 if TYPE_CHECKING:
-    from dynx.rbd.contact_step import ServoJoints
+    from dynx.rbd.contact_step import FramedShape, ServoJoints
     from dynx.steppers.material import Material
     from dynx.world.motors import Motor
     from dynx.world.scene import Scene, SceneBody, SceneRobot
@@ -176,10 +176,10 @@ class VariedGround(VariedRobot):
         task: RobotTask,
         randomization: Randomization | None,
         joints: JointOptions = DESCRIBED,
-        surfaces: Sequence[tuple[str, str]] = (),
+        touching: Sequence[FramedShape] = (),
     ) -> None:
-        """`surfaces` are link and ground of each contact."""
-        self._surfaces = surfaces
+        """`touching` are the shapes of the robot that may touch the ground."""
+        self._touching = touching
         super().__init__(task, randomization, joints)
         self.stops = False
 
@@ -209,14 +209,14 @@ class VariedGround(VariedRobot):
             max_torque=None if joints.max_torque is None else joints.max_torque * strength,
         )
 
-    def friction(self, friction: float, surfaces: tuple[str, str], drawn: Array) -> Any:
-        """Return the coefficient of friction of a link and the ground with drawn values (k,)."""
-        columns = self._columns("friction_scale")
+    def friction(self, shape: FramedShape, drawn: Array) -> Any:
+        """Return the coefficient of friction of a shape with the ground, with drawn values (k,)."""
+        columns, friction = self._columns("friction_scale"), shape.friction
         if not columns:
             return friction
         if None in columns:
             return friction * drawn[columns[None]]
-        factors = [drawn[columns[each]] for each in surfaces if each in columns]
+        factors = [drawn[columns[each]] for each in shape.parts if each in columns]
         return friction * sqrt(math.prod(factors[1:], start=factors[0])) if factors else friction
 
     def mechanism(self, mechanism: Mechanism, drawn: Array, *, masses: bool) -> Mechanism:
@@ -235,7 +235,7 @@ class VariedGround(VariedRobot):
         own = part.rpartition("/")[2]
         if field != "friction_scale":
             return super()._required(field, own)
-        known = sorted({name for surfaces in self._surfaces for name in surfaces})
+        known = sorted({name for shape in self._touching for name in shape.parts})
         return require_name("part that touches", own, known)
 
 

@@ -133,7 +133,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
                 raise UnsupportedFeatureError(f"{error}; {IN_WORLDS}, which keep all contacts") from None
             motion = motion_of(task, contacts)
             try:
-                varied = VariedGround(motion, drawn, joints, contacts.surfaces)
+                varied = VariedGround(motion, drawn, joints, contacts.touching.shapes)
             except UnsupportedFeatureError as error:
                 raise UnsupportedFeatureError(f"{error}; then {IN_WORLDS}") from None
             self._task_step = GroundStep(motion, contacts, varied)

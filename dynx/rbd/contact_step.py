@@ -93,6 +93,8 @@ class FramedShape(NamedTuple):
     """Coefficient of friction with the ground."""
     deepest: bool = False
     """True if only the deepest point of the shape counts."""
+    parts: tuple[str, str] = ("", "")
+    """Names of the link and of the ground."""
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import entry_points as all_entry_points
 from pathlib import Path
 
 import pytest
-
-from dynx import registry
 
 
 def write_package(folder: Path, module: str, text: str, entry_points: str) -> Path:
@@ -31,8 +28,6 @@ def installed_package(folder: Path, module: str, text: str, entry_points: str) -
     write_package(folder, module, text, entry_points)
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.syspath_prepend(str(folder))
-        # The tests remember the entry points (tests/conftest.py), which this package changes.
-        monkeypatch.setattr(registry, "entry_points", all_entry_points)
         try:
             yield folder
         finally:

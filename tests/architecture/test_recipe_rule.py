@@ -66,7 +66,7 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
 
     def install(*values: str) -> None:
         points = EntryPoints(EntryPoint(f"rule{k}", value, "dynx.rules") for k, value in enumerate(values))
-        monkeypatch.setattr("dynx.registry.entry_points", lambda *, group: points.select(group=group))
+        monkeypatch.setattr("dynx.registry.installed_entry_points", lambda group: points.select(group=group))
         all_rules.cache_clear()
 
     install()

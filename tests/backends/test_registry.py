@@ -36,7 +36,7 @@ class Mine(ReferenceBackend):
 
 def _offer(monkeypatch: pytest.MonkeyPatch, **values: str) -> None:
     points = EntryPoints(EntryPoint(name, value, registry.GROUP) for name, value in values.items())
-    monkeypatch.setattr(shared_registry, "entry_points", lambda *, group: points.select(group=group))
+    monkeypatch.setattr(shared_registry, "installed_entry_points", lambda group: points.select(group=group))
 
 
 @pytest.fixture
@@ -231,7 +231,7 @@ def test_two_packages_with_one_name_are_both_named(monkeypatch: pytest.MonkeyPat
     points = EntryPoints(
         EntryPoint("theirs", value, registry.GROUP) for value in ("one.package:A", "other.package:B")
     )
-    monkeypatch.setattr(shared_registry, "entry_points", lambda *, group: points)
+    monkeypatch.setattr(shared_registry, "installed_entry_points", lambda group: points)
     with pytest.raises(BackendError, match=r"more than once.*one\.package:A.*and.*other\.package:B"):
         backend_class("theirs")
     assert backend_names() == (*BUILT_IN, "theirs")

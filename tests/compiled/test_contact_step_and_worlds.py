@@ -135,9 +135,7 @@ def test_a1_moves_as_in_a_world() -> None:
     lower = [each for each in touching.shapes if model.mechanism.frames[each.frame].name.endswith("_calf")]
     touching = replace(touching, shapes=tuple(lower))
     assert len(lower) == 8
-    text = contact_step_text(
-        model, touching, h=H, kp=kp, kd=kd, joint_limits=True, inputs=("friction",), sweeps=TIGHT
-    )
+    text = contact_step_text(model, touching, h=H, kp=kp, kd=kd, joint_limits=True, sweeps=TIGHT)
     rng = np.random.default_rng(3)
     q, v = np.tile(model.neutral(), (n, 1)), rng.uniform(-1.0, 1.0, (n, model.nv))
     v[:, 2] = -0.5
@@ -147,7 +145,6 @@ def test_a1_moves_as_in_a_world() -> None:
     target = q[:, 7:] + rng.uniform(-0.3, 0.3, (n, 12))
     kernel = compiled(text)
     given = {"q": q, "v": v, "target": target, "impulses": np.zeros((n, text.inputs["impulses"]))}
-    given["friction"] = np.full((n, len(touching.shapes)), FRICTION)
     for k in range(n):
         gaps = [float(gap) for gap in contact_rows(model.mechanism, touching, q[k])[1]]
         q[k, 2] += (1e-3, 0.0, -1e-3)[k] - sorted(gaps)[1]

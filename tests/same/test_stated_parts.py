@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -120,7 +122,7 @@ def test_effects_are_those_of_closed_forms() -> None:
     assert home["position of a link"] == pytest.approx(2.0 * np.sin(0.1) * np.hypot(0.2, 0.3))
 
 
-def test_a_part_of_a_file_that_is_included_is_named_in_a_note(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_a_part_of_a_file_that_is_included_is_named_in_a_note(tmp_path: Path) -> None:
     (tmp_path / "parts.xml").write_text(f"<mujoco>{tendon(3.0)}</mujoco>")
     (tmp_path / "robot.xml").write_text(robot('<include file="parts.xml"/>'))
     report = same_robot(robot(tendon()), tmp_path / "robot.xml")

@@ -69,7 +69,7 @@ def test_a_registered_plant_is_simulated_by_its_name(drifting: str) -> None:
 
 def test_an_entry_point_adds_a_plant(monkeypatch: pytest.MonkeyPatch) -> None:
     points = EntryPoints([EntryPoint("theirs", f"{__name__}:Drifting", registry.GROUP)])
-    monkeypatch.setattr(shared_registry, "entry_points", lambda *, group: points.select(group=group))
+    monkeypatch.setattr(shared_registry, "installed_entry_points", lambda group: points.select(group=group))
     assert registry.plant_names() == ("theirs",)
     _assert_drifts("theirs")
 
