@@ -9,18 +9,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dynx.sim.scenario.options import OPTIONS
+from dynx.sim.scenario.options import OPTIONS, JointNumbers
 
 PAGE = Path(__file__).parent / "reference/simulation.md"
 BEGIN, END = "<!-- written by docs/write_options.py -->\n", "<!-- end -->\n"
 
 
 def table() -> str:
-    """The table of all options; rows marked by n may differ between the rollouts of a batch."""
-    lines = [("option", "meaning", "unit", "values", "default", ""), ("---",) * 6]
+    """The table of all options; those with "rows" may differ between the rollouts of a batch."""
+    lines = [("option", "meaning", "unit", "values", "default", "batch"), ("---",) * 6]
     for name, each in OPTIONS.items():
         default = each.default_text or ("none" if each.default == () else str(each.default))
-        lines.append((f"`{name}`", each.help, each.unit, each.kind.values, default, "n" * each.rows))
+        # The page explains joint numbers once, above the table.
+        values = "joint numbers" if isinstance(each.kind, JointNumbers) else each.kind.values
+        lines.append((f"`{name}`", each.help, each.unit, values, default, "rows" * each.rows))
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
