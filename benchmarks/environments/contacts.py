@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-import benchmarks.contact_steps as robots
+from benchmarks.contact_steps import MujocoRobots, quadruped
 from dynx.envs.library import AutoresetMode
 from dynx.envs.tasks.quadruped import ACTION_SCALE, KD, KP, POSTURE
 from dynx.envs.tasks.walk import Walk
@@ -46,8 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     from mujoco import MjData, rollout
 
-    robots.H, robots.KP, robots.KD = task.control_dt / task.substeps, KP, KD
-    theirs = robots.MujocoRobots(task.model, options.mujoco_envs)
+    robot = quadruped(h=task.control_dt / task.substeps, kp=KP, kd=KD)
+    theirs = MujocoRobots(robot, options.mujoco_envs)
     datas = [MjData(theirs.model) for _ in range(options.threads)]
     rng = np.random.default_rng(0)
     envs.reset(seed=0)
