@@ -161,21 +161,128 @@ class Joint:
     mimic: tuple[str, float, float] | None = None
     gear: float | None = None
     """Gear of a motor (MJCF only)."""
+    stiffness: float = 0.0
+    rest: float = 0.0
+    """Position at which the spring has no force (MJCF and SDF)."""
+    ref: float = 0.0
+    """Position in the pose of the file (MJCF only); `T` is the pose at 0."""
 
     @property
     def moves(self) -> bool:
-        """Whether the joint has a coordinate."""
+        """Whether the joint has one coordinate."""
         return self.type in MOVING
+
+    @property
+    def is_ball(self) -> bool:
+        """Whether the joint turns about a point; its limit is `upper`, the largest angle."""
+        return self.type == "ball"
+
+    def motion(self, position: float) -> Matrix:
+        """Return the pose of the child at a position in that at position 0."""
+        if self.type == "prismatic":
+            return pose(None, self.axis * position)
+        return pose(axis_angle(self.axis, position)) if self.moves and position else np.eye(4)
+
+
+@dataclass
+class Tendon:
+    """A fixed tendon: its length is the sum of coefficient times position over joints."""
+
+    name: str
+    terms: dict[str, float]
+    range: tuple[float, float] | None = None
+    stiffness: float = 0.0
+    rest: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+
+
+@dataclass
+class Equality:
+    """A constraint between two links (connect, weld), joints or tendons.
+
+    `second` may be empty for joints and tendons. `anchor` is a point in the first link (connect) or in the
+    second (weld). A weld turns the second link in the first as `T` and holds the origin of `T` at the anchor.
+    """
+
+    name: str
+    kind: str
+    first: str
+    second: str
+    anchor: Matrix = field(default_factory=lambda: np.zeros(3))
+    T: Matrix = field(default_factory=lambda: np.eye(4))
+    torque_scale: float = 1.0
+    polynomial: Matrix = field(default_factory=lambda: np.array([0.0, 1.0, 0.0, 0.0, 0.0]))
+    active: bool = True
+    time_constant: float = 0.02
+
+    @property
+    def joins_links(self) -> bool:
+        """Whether the constraint is between links."""
+        return self.kind in ("connect", "weld")
+
+
+@dataclass
+class Keyframe:
+    """Positions by joint: a number, or the rotation (3, 3) of a ball joint; the pose of a floating base."""
+
+    name: str
+    q: dict[str, float | Matrix]
+    T_world_root: Matrix = field(default_factory=lambda: np.eye(4))
+
+
+@dataclass
+class Actuator:
+    """A motor, position or velocity servo on a joint or a tendon; `gain` is kp or kv."""
+
+    name: str
+    kind: str
+    target: str
+    on_tendon: bool = False
+    gear: float = 1.0
+    gain: float = 1.0
+    ctrl_range: tuple[float, float] | None = None
+    force_range: tuple[float, float] | None = None
 
 
 @dataclass
 class Robot:
-    """Links and joints in the order of the document; `exclusions` are pairs of links (MJCF only)."""
+    """Links and joints in the order of the document, and what MJCF alone has.
+
+    `exclusions` are pairs of links that do not touch, `contacts` pairs of shapes that do.
+    """
 
     name: str
     links: dict[str, Link]
     joints: list[Joint]
     exclusions: list[tuple[str, str]] = field(default_factory=list)
+    contacts: list[tuple[Shape, Shape]] = field(default_factory=list)
+    tendons: list[Tendon] = field(default_factory=list)
+    equalities: list[Equality] = field(default_factory=list)
+    keyframes: list[Keyframe] = field(default_factory=list)
+    actuators: list[Actuator] = field(default_factory=list)
+
+    @property
+    def has_connect(self) -> bool:
+        """Whether a constraint depends on the pose of the file."""
+        return any(each.kind == "connect" for each in self.equalities)
+
+    def is_implied(self, link: str) -> bool:
+        """Whether a link is one that MJCF does not write: it stands between two joints of one body."""
+        above, below = self.above(link), self.children(link)
+        named = above is not None and link == f"{above.name}_link" and above.type != "fixed"
+        own = self.links[link]
+        return named and len(below) == 1 and own.inertial is None and not own.shapes
+
+    def chain(self, joint: Joint) -> list[Joint]:
+        """Return the joints of one body of MJCF, from the first on; a fixed joint may be the last."""
+        found = [joint]
+        while found[-1].type != "fixed" and self.is_implied(found[-1].child):
+            below = self.children(found[-1].child)[0]
+            if np.any(below.T[:3, :3] != np.eye(3)):
+                break
+            found.append(below)
+        return found
 
     def copy(self) -> Robot:
         """Return a copy that shares nothing."""
@@ -365,6 +472,10 @@ class Style:
     """Joint damping and axis of MJCF as a default class."""
     sites: bool = False
     """Links that only name a place become sites in MJCF."""
+    free_joint: bool = False
+    """A floating base of MJCF by `<joint type="free">`."""
+    quat_scale: float = 1.0
+    """Factor of quaternions in keyframes of MJCF; none is a difference."""
 
 
 def exponential(value: float) -> str:
@@ -389,6 +500,10 @@ def _shuffled(style: Style, element: ET.Element, fixed: tuple[str, ...] = ()) ->
             continue
         children = list(each)
         style.shuffle.shuffle(children)
+        if each.tag == "body":
+            # The joints of a body move it one after the other.
+            joints = iter(child for child in each if child.tag == "joint")
+            children = [next(joints) if child.tag == "joint" else child for child in children]
         each[:] = children
 
 
@@ -444,6 +559,8 @@ def write_urdf(robot: Robot, style: Style | None = None) -> str:
                 values = {n: style.number(float(v)) for n, v in zip(names, shape.size, strict=False)}
             ET.SubElement(geometry, shape.kind, values)
     for joint in robot.joints:
+        if joint.is_ball:
+            raise ValueError("URDF has no ball joint")
         element = ET.SubElement(root, "joint", name=joint.name, type=joint.type)
         origin(element, joint.T)
         ET.SubElement(element, "parent", link=joint.parent)
@@ -487,7 +604,7 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
     style = style or Style()
     if any(joint.mimic is not None for joint in robot.joints):
         raise ValueError("a mimic is no joint of MJCF")
-    if any(joint.type not in (*MOVING, "fixed") for joint in robot.joints):
+    if any(joint.type not in (*MOVING, "fixed", "ball") for joint in robot.joints):
         raise ValueError("a planar or floating joint")
     root = ET.Element("mujoco", model=robot.name)
     compiler = ET.SubElement(root, "compiler", inertiafromgeom="false")
@@ -511,6 +628,8 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
             group="1",
         )
     world = ET.SubElement(root, "worldbody")
+    shapes = [shape for pair in robot.contacts for shape in pair]
+    contact_names = {id(shape): f"shape_{i}" for i, shape in enumerate(shapes)}
 
     def place(element: ET.Element, T: Matrix) -> None:
         if style.spelled or np.any(T[:3, 3]):
@@ -566,6 +685,8 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
                 )
         for shape in link.shapes:
             geom = ET.SubElement(body, "geom", type=shape.kind)
+            if id(shape) in contact_names:
+                geom.set("name", contact_names[id(shape)])
             place(geom, shape.T)
             size = list(shape.size)
             if shape.kind == "box":
@@ -591,37 +712,62 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
                 site = ET.SubElement(body, "site", name=link.name)
                 place(site, joint.T)
                 continue
+            chain = robot.chain(joint)
+            link, T = robot.links[chain[-1].child], np.eye(4)
             inner = ET.SubElement(body, "body", name=link.name)
-            place(inner, joint.T)
-            if joint.moves:
-                element = ET.SubElement(inner, "joint", name=joint.name)
-                if joint.type == "prismatic":
-                    element.set("type", "slide")
-                elif style.spelled:
-                    element.set("type", "hinge")
-                if style.spelled or np.any(joint.axis != ([0.0, 0.0, 1.0] if axis is None else axis)):
-                    element.set("axis", _text(style, joint.axis))
-                if joint.lower is not None and joint.upper is not None:
-                    if joint.lower >= joint.upper:
-                        raise ValueError("a range that is empty")
-                    factor = 1.0 if joint.type == "prismatic" else unit
-                    element.set("range", _text(style, [factor * joint.lower, factor * joint.upper]))
-                    if style.spelled:
-                        element.set("limited", "true")
-                elif style.spelled:
-                    element.set("limited", "false")
-                if joint.damping != damping or style.spelled:
-                    element.set("damping", style.number(float(joint.damping)))
-                if joint.friction or style.spelled:
-                    element.set("frictionloss", style.number(float(joint.friction)))
-                if joint.armature or style.spelled:
-                    element.set("armature", style.number(float(joint.armature)))
-                if joint.effort:
-                    element.set("actuatorfrcrange", _text(style, [-joint.effort, joint.effort]))
-                if joint.velocity is not None:
-                    raise ValueError("a limit of velocity")
+            elements = []
+            for each in reversed(chain):
+                T = each.motion(each.ref) @ T
+                if each.type != "fixed":
+                    elements.append(joint_element(each, inverse(T)))
+                T = each.T @ T
+            place(inner, T)
+            inner.extend(reversed(elements))
             fill(inner, link)
             descend(inner, link.name)
+
+    def joint_element(joint: Joint, T: Matrix) -> ET.Element:
+        """Return the element of a joint at a pose in its body."""
+        element = ET.Element("joint", name=joint.name)
+        if joint.is_ball:
+            element.set("type", "ball")
+            if np.any(T[:3, :3] != np.eye(3)):
+                raise ValueError("a ball joint whose frame is turned in its body")
+        elif joint.type == "prismatic":
+            element.set("type", "slide")
+        elif style.spelled:
+            element.set("type", "hinge")
+        if np.any(T[:3, 3]):
+            element.set("pos", _text(style, T[:3, 3]))
+        own_axis = T[:3, :3] @ joint.axis
+        is_default = np.array_equal(own_axis, [0.0, 0.0, 1.0] if axis is None else axis)
+        if joint.moves and (style.spelled or not is_default):
+            element.set("axis", _text(style, own_axis))
+        factor = 1.0 if joint.type == "prismatic" else unit
+        if joint.is_ball and joint.upper is not None:
+            element.set("range", _text(style, [0.0, factor * joint.upper]))
+        elif joint.moves and joint.lower is not None and joint.upper is not None:
+            if joint.lower >= joint.upper:
+                raise ValueError("a range that is empty")
+            element.set("range", _text(style, [factor * joint.lower, factor * joint.upper]))
+        if style.spelled:
+            element.set("limited", "true" if "range" in element.attrib else "false")
+        if joint.damping != damping or style.spelled:
+            element.set("damping", style.number(float(joint.damping)))
+        if joint.friction or style.spelled:
+            element.set("frictionloss", style.number(float(joint.friction)))
+        if joint.armature or style.spelled:
+            element.set("armature", style.number(float(joint.armature)))
+        if joint.stiffness and joint.moves:
+            element.set("stiffness", style.number(float(joint.stiffness)))
+            element.set("springref", style.number(factor * float(joint.rest)))
+        if joint.ref:
+            element.set("ref", style.number(factor * float(joint.ref)))
+        if joint.effort and joint.moves:
+            element.set("actuatorfrcrange", _text(style, [-joint.effort, joint.effort]))
+        if joint.velocity is not None:
+            raise ValueError("a limit of velocity")
+        return element
 
     top = robot.links[robot.root]
     if top.name == "world":
@@ -631,27 +777,151 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
         descend(world, "world")
     else:
         body = ET.SubElement(world, "body", name=top.name)
-        if floating:
+        if floating and style.free_joint:
+            # A default class would give this element damping, but not `freejoint`.
+            ET.SubElement(body, "joint", type="free", damping="0", limited="false")
+        elif floating:
             ET.SubElement(body, "freejoint")
         fill(body, top)
         descend(body, top.name)
-    if robot.exclusions:
+    if robot.exclusions or robot.contacts:
         contact = ET.SubElement(root, "contact")
         for first, second in robot.exclusions:
             ET.SubElement(contact, "exclude", body1=first, body2=second)
-    if any(joint.gear is not None for joint in robot.joints):
-        actuators = ET.SubElement(root, "actuator")
-        for joint in robot.joints:
-            if joint.gear is not None:
-                ET.SubElement(
-                    actuators,
-                    "motor",
-                    name="motor_" + joint.name,
-                    joint=joint.name,
-                    gear=style.number(joint.gear),
-                )
+        for pair in robot.contacts:
+            geoms = [contact_names[id(shape)] for shape in pair]
+            ET.SubElement(contact, "pair", geom1=geoms[0], geom2=geoms[1])
+    _write_couplings(root, robot, style)
     _shuffled(style, root)
+    _write_keyframes(root, robot, floating, style)
     return _finished(root)
+
+
+def _hoist(style: Style, root: ET.Element, elements: list[ET.Element], tag: str, own: set[str]) -> None:
+    """Move values that all elements state into a default class: the main one, or one that they name.
+
+    Actuators name one, for a class has the same values for each kind of them.
+    """
+    if not style.classes or not elements:
+        return
+    default = root.find("default")
+    if default is None:
+        default = ET.SubElement(root, "default")
+    if style.rotation % 2 or tag not in ("tendon", "equality"):
+        default = ET.SubElement(default, "default", {"class": f"usual_{tag}"})
+        for each in elements:
+            each.set("class", f"usual_{tag}")
+    shared = ET.SubElement(default, tag)
+    for name in set.intersection(*(set(each.attrib) for each in elements)) - own - {"name", "class"}:
+        value = elements[0].attrib[name]
+        shared.set(name, value)
+        for each in elements:
+            if each.attrib[name] == value:
+                del each.attrib[name]
+
+
+def _write_couplings(root: ET.Element, robot: Robot, style: Style) -> None:
+    """Write tendons, equality constraints and actuators."""
+    number = style.number
+    refs = {joint.name: joint.ref for joint in robot.joints}
+    lengths = {each.name: sum(c * refs[joint] for joint, c in each.terms.items()) for each in robot.tendons}
+    section = ET.SubElement(root, "tendon") if robot.tendons else root
+    elements = []
+    for tendon in robot.tendons:
+        element = ET.SubElement(section, "fixed", name=tendon.name)
+        if tendon.range is not None:
+            element.set("range", _text(style, tendon.range))
+        element.set("limited", "false" if tendon.range is None else "true")
+        for name, value in (
+            ("stiffness", tendon.stiffness),
+            ("springlength", tendon.rest),
+            ("damping", tendon.damping),
+            ("frictionloss", tendon.friction),
+        ):
+            element.set(name, number(float(value)))
+        for joint, coefficient in tendon.terms.items():
+            ET.SubElement(element, "joint", joint=joint, coef=number(float(coefficient)))
+        elements.append(element)
+    _hoist(style, root, elements, "tendon", set())
+    section = ET.SubElement(root, "equality") if robot.equalities else root
+    elements = []
+    for each in robot.equalities:
+        element = ET.SubElement(section, each.kind, name=each.name)
+        elements.append(element)
+        element.set("active", "true" if each.active else "false")
+        element.set("solref", f"{number(float(each.time_constant))} 1")
+        if each.joins_links:
+            element.attrib.update(body1=each.first, body2=each.second, anchor=_text(style, each.anchor))
+            if each.kind == "weld":
+                element.set("relpose", _text(style, [*each.T[:3, 3], *quat_wxyz(each.T[:3, :3])]))
+                element.set("torquescale", number(float(each.torque_scale)))
+            continue
+        zero = refs if each.kind == "joint" else lengths
+        element.set(f"{each.kind}1", each.first)
+        # The polynomial of MJCF is one of displacements from the pose of the file.
+        polynomial = np.polynomial.Polynomial(each.polynomial)
+        if each.second:
+            element.set(f"{each.kind}2", each.second)
+            if zero[each.second]:
+                polynomial = polynomial(np.polynomial.Polynomial([zero[each.second], 1.0]))
+        values = np.zeros(5)
+        values[: len(polynomial.coef)] = polynomial.coef
+        values[0] -= zero[each.first]
+        element.set("polycoef", _text(style, values))
+    _hoist(style, root, elements, "equality", {"anchor", "relpose", "torquescale", "polycoef"} | _ENDS)
+    motors = [
+        Actuator("motor_" + joint.name, "motor", joint.name, gear=joint.gear)
+        for joint in robot.joints
+        if joint.gear is not None
+    ]
+    section = ET.SubElement(root, "actuator") if motors or robot.actuators else root
+    for kind in ("motor", "position", "velocity"):
+        elements = []
+        for actuator in (*motors, *robot.actuators):
+            if actuator.kind != kind:
+                continue
+            element = ET.SubElement(section, kind, name=actuator.name, gear=number(float(actuator.gear)))
+            element.set("tendon" if actuator.on_tendon else "joint", actuator.target)
+            if kind != "motor":
+                element.set("kp" if kind == "position" else "kv", number(float(actuator.gain)))
+            for name, limits in (("ctrl", actuator.ctrl_range), ("force", actuator.force_range)):
+                element.set(f"{name}limited", "false" if limits is None else "true")
+                if limits is not None:
+                    element.set(f"{name}range", _text(style, limits))
+            elements.append(element)
+        _hoist(style, root, elements, kind, {"joint", "tendon"})
+
+
+_ENDS = {f"{kind}{i}" for kind in ("body", "joint", "tendon") for i in (1, 2)}
+"""Attributes of a constraint that name what it couples."""
+
+
+def _write_keyframes(root: ET.Element, robot: Robot, floating: bool, style: Style) -> None:
+    """Write keyframes, in the order that the joints of the document have."""
+    if not robot.keyframes:
+        return
+    known = {joint.name for joint in robot.joints}
+    world = root.find("worldbody")
+    assert world is not None
+    # The joints of a body come before those of the bodies in it, wherever the document has them.
+    order, bodies = [], [world]
+    while bodies:
+        body = bodies.pop()
+        order += [name for each in body.findall("joint") if (name := each.get("name", "")) in known]
+        bodies += body.findall("body")[::-1]
+    section = ET.SubElement(root, "keyframe")
+    for key in robot.keyframes:
+        values: list[float] = []
+        if floating:
+            values += [*key.T_world_root[:3, 3], *style.quat_scale * quat_wxyz(key.T_world_root[:3, :3])]
+        for name in order:
+            q = key.q[name]
+            values += [q] if isinstance(q, float) else [*style.quat_scale * quat_wxyz(q)]
+        ET.SubElement(section, "key", name=key.name, qpos=_text(style, values))
+    if style.shuffle is not None:
+        keys = list(section)
+        style.shuffle.shuffle(keys)
+        section[:] = keys
 
 
 def write_sdf(robot: Robot, floating: bool, style: Style | None = None) -> str:
@@ -738,7 +1008,7 @@ def write_sdf(robot: Robot, floating: bool, style: Style | None = None) -> str:
     for joint in robot.joints:
         if joint.child in frames:
             continue
-        if joint.type not in (*MOVING, "fixed"):
+        if joint.type not in (*MOVING, "fixed", "ball"):
             raise ValueError("a planar or floating joint")
         element = ET.SubElement(model, "joint", name=joint.name, type=joint.type)
         ET.SubElement(element, "parent").text = joint.parent
@@ -759,10 +1029,12 @@ def write_sdf(robot: Robot, floating: bool, style: Style | None = None) -> str:
             value(limit, "effort", joint.effort)
         if joint.velocity is not None:
             value(limit, "velocity", joint.velocity)
-        if style.spelled or joint.damping or joint.friction:
+        if style.spelled or joint.damping or joint.friction or joint.stiffness:
             dynamics = ET.SubElement(axis, "dynamics")
             value(dynamics, "damping", joint.damping)
             value(dynamics, "friction", joint.friction)
+            value(dynamics, "spring_stiffness", joint.stiffness)
+            value(dynamics, "spring_reference", joint.rest)
         if joint.mimic is not None:
             leader, multiplier, offset = joint.mimic
             mimic = ET.SubElement(axis, "mimic", joint=leader)
@@ -781,7 +1053,10 @@ def write(robot: Robot, to: Format, floating: bool, style: Style | None = None) 
 
 
 def lines(robot: Robot) -> dict[str, Matrix]:
-    """Return direction and moment of joint axes at position 0, in the root link; a slide has no moment."""
+    """Return direction and moment of joint axes at position 0, in the root link.
+
+    A slide has no moment; a ball joint has its centre instead.
+    """
     poses = robot.poses()
     found = {}
     for joint in robot.joints:
@@ -790,6 +1065,8 @@ def lines(robot: Robot) -> dict[str, Matrix]:
             direction = T[:3, :3] @ joint.axis
             moment = np.zeros(3) if joint.type == "prismatic" else np.cross(T[:3, 3], direction)
             found[joint.name] = np.concatenate([direction, moment])
+        elif joint.is_ball:
+            found[joint.name] = np.concatenate([np.zeros(3), poses[joint.child][:3, 3]])
     return found
 
 

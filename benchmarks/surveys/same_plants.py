@@ -603,7 +603,7 @@ def _mended_difference(
     a: tuple[Robot, str, Format], it: Rewritten, mended: str, to: Format, floating: bool, seed: int
 ) -> float:
     try:
-        return text_difference(a, (it.robot, mended, to), floating, seed, it.signs, it.names, it.T_root)
+        return text_difference(a, (it.robot, mended, to), floating, seed, it.by)
     except Exception:
         return float("inf")
 

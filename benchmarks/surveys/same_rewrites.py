@@ -33,14 +33,18 @@ import numpy as np
 
 from benchmarks.progress import Record, tell
 from benchmarks.surveys.robot_texts import (
+    Actuator,
+    Equality,
     Format,
     Inertial,
     Joint,
+    Keyframe,
     Link,
     Matrix,
     Robot,
     Shape,
     Style,
+    Tendon,
     axis_angle,
     combined,
     exponential,
@@ -52,7 +56,12 @@ from benchmarks.surveys.robot_texts import (
     write,
     write_urdf,
 )
-from benchmarks.surveys.robot_truth import line_difference, text_difference
+from benchmarks.surveys.robot_truth import (
+    Correspondence,
+    coupling_difference,
+    line_difference,
+    text_difference,
+)
 
 TOLERANCE = 1e-10
 """Tolerance of the comparison for planted differences; rewrites are compared with the default."""
@@ -102,15 +111,25 @@ def random_shape(rng: np.random.Generator, visual: bool) -> Shape:
 
 
 def random_robot(rng: np.random.Generator) -> Robot:
-    """Return a random tree of 2 to 12 joints of every kind that has one coordinate or none."""
+    """Return a random tree of 2 to 12 joints; one in two has ball joints, which excludes mimics and URDF."""
     count = int(rng.integers(2, 13))
+    kinds = ["revolute", "revolute", "continuous", "prismatic", "fixed"]
+    has_balls = bool(rng.random() < 0.5)
+    kinds += ["ball", "ball"] * has_balls
     robot = Robot("random", {"link_0": Link("link_0", random_inertial(rng, 0.2))}, [])
     for i in range(1, count + 1):
-        kind = str(rng.choice(["revolute", "revolute", "continuous", "prismatic", "fixed"]))
+        kind = str(rng.choice(kinds))
         parent = f"link_{rng.integers(max(0, i - 3), i)}"
         axis = np.eye(3)[rng.integers(3)] * rng.choice([-1, 1]) if rng.random() < 0.5 else rng.normal(size=3)
         T = pose(random_rotation(rng) if rng.random() < 0.6 else None, rng.uniform(-0.4, 0.4, 3).round(3))
+        if kind != "fixed" and rng.random() < 0.15:
+            # In one body of MJCF no joint that turns may follow a ball joint.
+            others = [each for each in kinds if each != "ball" or kind == "prismatic"]
+            parent = insert_joint(robot, rng, parent, f"joint_{i}_first", others, T)
+            T = pose(None, rng.uniform(-0.2, 0.2, 3).round(3))
         joint = Joint(f"joint_{i}", kind, parent, f"link_{i}", T, axis / np.linalg.norm(axis))
+        if joint.is_ball:
+            draw_ball(joint, rng)
         if joint.moves:
             joint.effort, joint.velocity = round(rng.uniform(1, 100), 2), round(rng.uniform(1, 10), 2)
             joint.damping, joint.friction = (
@@ -118,8 +137,10 @@ def random_robot(rng: np.random.Generator) -> Robot:
             )
             if kind != "continuous":
                 joint.lower, joint.upper = round(rng.uniform(-3, -0.1), 3), round(rng.uniform(0.1, 3), 3)
+            if rng.random() < 0.2:
+                joint.stiffness, joint.rest = round(rng.uniform(0.1, 5), 3), round(rng.uniform(-0.5, 0.5), 3)
             leaders = [each.name for each in robot.joints if each.type == kind and each.mimic is None]
-            if leaders and rng.random() < 0.1:
+            if leaders and not has_balls and rng.random() < 0.1:
                 joint.mimic = (
                     str(rng.choice(leaders)),
                     round(rng.uniform(0.3, 2), 2),
@@ -129,6 +150,8 @@ def random_robot(rng: np.random.Generator) -> Robot:
         link.shapes = [random_shape(rng, bool(rng.random() < 0.5)) for _ in range(rng.integers(0, 3))]
         robot.links[link.name] = link
         robot.joints.append(joint)
+        if joint.type != "fixed" and rng.random() < 0.15:
+            offset_link(robot, joint, rng.uniform(-0.2, 0.2, 3).round(3))
     if not any(joint.moves for joint in robot.joints):
         return random_robot(rng)
     if rng.random() < 0.4:
@@ -140,10 +163,111 @@ def random_robot(rng: np.random.Generator) -> Robot:
     return robot
 
 
+def draw_ball(joint: Joint, rng: np.random.Generator) -> None:
+    """Draw the largest angle and the losses of a ball joint."""
+    if rng.random() < 0.5:
+        joint.upper = round(rng.uniform(0.3, 3.0), 3)
+    joint.damping, joint.friction, joint.armature = (
+        round(rng.uniform(0, 1), 3) if rng.random() < 0.3 else 0.0 for _ in "abc"
+    )
+
+
+def insert_joint(
+    robot: Robot, rng: np.random.Generator, parent: str, name: str, kinds: list[str], T: Matrix
+) -> str:
+    """Add a joint that moves no link of its own, and return the link between it and the next joint."""
+    axis = rng.normal(size=3)
+    kind = str(rng.choice([each for each in kinds if each != "fixed"]))
+    joint = Joint(name, kind, parent, f"{name}_link", T, axis / np.linalg.norm(axis))
+    if joint.is_ball:
+        draw_ball(joint, rng)
+    elif kind != "continuous":
+        joint.lower, joint.upper = round(rng.uniform(-3, -0.1), 3), round(rng.uniform(0.1, 3), 3)
+    if joint.moves:
+        joint.effort, joint.velocity = round(rng.uniform(1, 100), 2), round(rng.uniform(1, 10), 2)
+    robot.links[joint.child] = Link(joint.child)
+    robot.joints.append(joint)
+    return joint.child
+
+
+def offset_link(robot: Robot, joint: Joint, p: Matrix) -> None:
+    """Put a link away from its joint, to the point p in the frame that it had; its contents go along."""
+    between, child = f"{joint.name}_link", joint.child
+    robot.links[between] = Link(between)
+    joint.child = between
+    robot.joints.append(Joint(f"{child}_fixed", "fixed", between, child, pose(None, p)))
+
+
+def decorate(robot: Robot, rng: np.random.Generator, floating: bool) -> None:
+    """Draw what MJCF alone can say: tendons, constraints, keyframes, actuators, filters, pairs."""
+    moving = [joint.name for joint in robot.joints if joint.moves]
+
+    def several(most: int) -> range:
+        return range(int(rng.integers(0, most + 1)))
+
+    def interval(size: float) -> tuple[float, float]:
+        return -round(rng.uniform(0.1, size), 3), round(rng.uniform(0.1, size), 3)
+
+    for i in several(3):
+        names = rng.permutation(moving)[: rng.integers(1, 5)]
+        terms = {str(name): round(float(rng.choice([-1, 1]) * rng.uniform(0.1, 2.0)), 3) for name in names}
+        tendon = Tendon(f"tendon_{i}", terms, interval(2.0) if rng.random() < 0.5 else None)
+        tendon.stiffness, tendon.rest = round(rng.uniform(0.1, 5), 3), round(rng.uniform(-0.5, 0.5), 3)
+        tendon.damping, tendon.friction = (
+            round(rng.uniform(0, 1), 3) if rng.random() < 0.5 else 0.0 for _ in "ab"
+        )
+        robot.tendons.append(tendon)
+    heavy = [name for name, link in robot.links.items() if not link.is_empty and name != "world"]
+    for i in several(4):
+        kind = str(rng.choice(["connect", "weld", "joint", "tendon"]))
+        each = Equality(f"equality_{i}", kind, "", "", active=bool(rng.random() < 0.7))
+        if rng.random() < 0.5:
+            each.time_constant = round(rng.uniform(0.01, 0.1), 4)
+        if each.joins_links:
+            each.first = str(rng.choice(heavy))
+            apart = [name for name in heavy if name not in robot.body(each.first)]
+            if not apart:
+                continue
+            each.second = str(rng.choice(apart))
+            each.anchor = rng.uniform(-0.2, 0.2, 3).round(3)
+            each.T = pose(random_rotation(rng), rng.uniform(-0.3, 0.3, 3))
+            each.torque_scale = round(rng.uniform(0.5, 2), 2) if kind == "weld" else 1.0
+        else:
+            names = rng.permutation(moving if kind == "joint" else [tendon.name for tendon in robot.tendons])
+            if len(names) == 0:
+                continue
+            each.first, each.second = str(names[0]), str(names[1]) if len(names) > 1 else ""
+            each.polynomial = rng.uniform(-1, 1, 5).round(3) * (rng.random(5) < 0.6)
+            if not each.second:
+                each.polynomial[1:] = [1.0, 0.0, 0.0, 0.0]
+        robot.equalities.append(each)
+    for i in several(3):
+        key = Keyframe(f"key_{i}", {name: round(float(rng.uniform(-1, 1)), 4) for name in moving})
+        key.q.update({joint.name: random_rotation(rng) for joint in robot.joints if joint.is_ball})
+        if floating:
+            key.T_world_root = pose(random_rotation(rng), rng.uniform(-1, 1, 3).round(3))
+        robot.keyframes.append(key)
+    for i in several(3):
+        on_tendon = bool(robot.tendons) and bool(rng.random() < 0.4)
+        target = str(rng.choice([tendon.name for tendon in robot.tendons] if on_tendon else moving))
+        actuator = Actuator(
+            f"actuator_{i}", str(rng.choice(["motor", "position", "velocity"])), target, on_tendon
+        )
+        actuator.gear, actuator.gain = round(rng.uniform(0.5, 50), 2), round(rng.uniform(0.5, 50), 2)
+        actuator.ctrl_range = interval(2.0) if rng.random() < 0.5 else None
+        actuator.force_range = interval(20.0) if rng.random() < 0.5 else None
+        robot.actuators.append(actuator)
+    touching = [name for name, link in robot.links.items() if any(not each.visual for each in link.shapes)]
+    if len(touching) > 1 and rng.random() < 0.5:
+        first, second = (str(name) for name in rng.choice(touching, 2, replace=False))
+        if "world" not in (first, second) and second not in robot.body(first):
+            robot.exclusions.append((first, second))
+
+
 def draw_robot(rng: np.random.Generator) -> tuple[str, Robot, str | None, bool]:
     """Return name, robot, the text of its file if it has one, and whether its base floats."""
     choice = rng.random()
-    if choice < 0.3:
+    if choice < 0.3 or rng.random() < 0.3:
         robot = random_robot(rng)
         return "random", robot, None, bool(rng.random() < 0.5)
     name = str(rng.choice(" ".join(OWN if choice < 0.42 else LIBRARY).split()))
@@ -160,13 +284,77 @@ def draw_robot(rng: np.random.Generator) -> tuple[str, Robot, str | None, bool]:
 
 @dataclass
 class Rewritten:
-    """A rewritten robot: signs of joints, new names of joints, and the pose of its root in the former one."""
+    """A rewritten robot and its coordinates from those of the former one."""
 
     robot: Robot
     signs: dict[str, int] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
+    turns: dict[str, tuple[Matrix, Matrix]] = field(default_factory=dict)
     T_root: Matrix = field(default_factory=lambda: np.eye(4))
     renamed: bool = False
+
+    @property
+    def by(self) -> Correspondence:
+        """The coordinates of the rewritten robot from those of the former one."""
+        return Correspondence(self.signs, self.names, self.turns, self.T_root)
+
+    def turn_ball(self, joint: str, before: Matrix, after: Matrix) -> None:
+        """Turn frames of a ball joint: its former rotation is `before`, the new one, `after`."""
+        former = next((old for old, new in self.names.items() if new == joint), joint)
+        first, last = self.turns.get(former, (np.eye(3), np.eye(3)))
+        self.turns[former] = (first @ before, after @ last)
+        for key in self.robot.keyframes:
+            q = key.q[joint]
+            assert not isinstance(q, float)
+            key.q[joint] = before.T @ q @ after.T
+
+    def move_frame(self, name: str, T: Matrix) -> None:
+        """Give a link the frame that has the pose T in its former one; what it carries stays.
+
+        A revolute joint above allows turns and moves along its axis, a ball joint turns.
+        """
+        robot, back = self.robot, inverse(T)
+        link, above = robot.links[name], robot.above(name)
+        if link.inertial is not None:
+            link.inertial = link.inertial.moved(back)
+        for shape in link.shapes:
+            shape.T = back @ shape.T
+        for joint in robot.children(name):
+            joint.T = back @ joint.T
+        for each in robot.equalities:
+            if not each.joins_links:
+                continue
+            if name == (each.first if each.kind == "connect" else each.second):
+                each.anchor = (back @ np.append(each.anchor, 1.0))[:3]
+            if name == each.first:
+                each.T = back @ each.T
+            if name == each.second:
+                each.T = each.T @ pose(T[:3, :3])
+        if above is None:
+            self.T_root = self.T_root @ T
+            for key in robot.keyframes:
+                key.T_world_root = key.T_world_root @ T
+            return
+        R = T[:3, :3]
+        above.T = above.T @ T
+        above.axis = R.T @ above.axis
+        if above.is_ball:
+            self.turn_ball(above.name, R, R.T)
+
+
+def has_rough_ball(robot: Robot, link: str) -> bool:
+    """Check whether the body of MJCF that has the link turns in a ball joint with friction.
+
+    MuJoCo's friction acts about each of the three axes of the body.
+    """
+    above = robot.above(link)
+    while above is not None:
+        if above.is_ball and above.friction:
+            return True
+        if not robot.is_implied(above.parent):
+            return False
+        above = robot.above(above.parent)
+    return False
 
 
 def move_frames(it: Rewritten, rng: np.random.Generator, floating: bool) -> None:
@@ -177,23 +365,67 @@ def move_frames(it: Rewritten, rng: np.random.Generator, floating: bool) -> None
         if link.is_empty or rng.random() < 0.3 or (above is None and not floating):
             continue
         R, p = random_rotation(rng), rng.uniform(-0.3, 0.3, 3)
+        if has_rough_ball(robot, name):
+            R = rotation_from_rpy(rng.integers(-1, 3, 3) * np.pi / 2)
         if above is not None and above.type in ("revolute", "continuous"):
             p = above.axis * rng.uniform(-0.3, 0.3) * rng.integers(0, 2)
+        elif above is not None and above.is_ball:
+            p = np.zeros(3)
         elif above is not None and above.type not in ("prismatic", "fixed"):
             continue
-        T = pose(R, p)
-        back = inverse(T)
-        if link.inertial is not None:
-            link.inertial = link.inertial.moved(back)
-        for shape in link.shapes:
-            shape.T = back @ shape.T
-        for joint in robot.children(name):
-            joint.T = back @ joint.T
-        if above is None:
-            it.T_root = it.T_root @ T
-        else:
-            above.T = above.T @ T
-            above.axis = R.T @ above.axis
+        it.move_frame(name, pose(R, p))
+
+
+def turn_zero_poses(it: Rewritten, rng: np.random.Generator, floating: bool) -> None:
+    """Turn zero poses of ball joints without limits, if no constraint depends on the pose of the file."""
+    if it.robot.has_connect:
+        return
+    for joint in it.robot.joints:
+        implied = it.robot.is_implied(joint.parent)
+        if joint.is_ball and joint.upper is None and not implied and rng.random() < 0.5:
+            R = random_rotation(rng)
+            joint.T = joint.T @ pose(R)
+            it.turn_ball(joint.name, R, np.eye(3))
+
+
+def offset_links(it: Rewritten, rng: np.random.Generator, floating: bool) -> None:
+    """Move frames of links away from their joints, so that MJCF states the points of the joints."""
+    robot = it.robot
+    for name in list(robot.links):
+        above = robot.above(name)
+        if above is None or above.type == "fixed" or robot.links[name].is_empty or rng.random() < 0.5:
+            continue
+        p = rng.uniform(-0.2, 0.2, 3)
+        offset_link(robot, above, np.zeros(3))
+        it.move_frame(name, pose(None, p))
+
+
+def align_chains(it: Rewritten) -> None:
+    """Turn frames between joints of one body of MJCF like the body, for MJCF states only one frame."""
+    robot = it.robot
+    for name in list(robot.links):
+        if name in robot.links and not robot.is_implied(name):
+            above = robot.above(name)
+            while above is not None and robot.is_implied(above.parent):
+                R = above.T[:3, :3].copy()
+                it.move_frame(above.parent, pose(R))
+                above.T[:3, :3] = np.eye(3)
+                above = robot.above(above.parent)
+
+
+def change_references(it: Rewritten, rng: np.random.Generator, floating: bool) -> None:
+    """Draw another pose of the file, if no constraint depends on it."""
+    robot = it.robot
+    if robot.has_connect:
+        return
+    for joint in robot.joints:
+        if not joint.moves or rng.random() < 0.5:
+            continue
+        chain = joint
+        while robot.is_implied(chain.parent):
+            chain = next(each for each in robot.joints if each.child == chain.parent)
+        if not any(each.is_ball for each in robot.chain(chain)):
+            joint.ref = round(rng.uniform(-0.5, 0.5), 3)
 
 
 def turn_inertias(it: Rewritten, rng: np.random.Generator, floating: bool) -> None:
@@ -232,6 +464,9 @@ def split_links(it: Rewritten, rng: np.random.Generator, floating: bool) -> None
         for joint in robot.children(name):
             if rng.random() < 0.5:
                 joint.parent, joint.T = new.name, inverse(T) @ joint.T
+        for pair in list(robot.exclusions):
+            if name in pair:
+                robot.exclusions.append((new.name, pair[1] if pair[0] == name else pair[0]))
         robot.links[new.name] = new
         robot.joints.append(Joint(f"{name}_split", "fixed", name, new.name, T))
 
@@ -243,13 +478,18 @@ def merge_links(it: Rewritten, rng: np.random.Generator, floating: bool) -> None
         link, into = robot.links[joint.child], robot.links[joint.parent]
         if link.is_empty or into.is_empty or rng.random() < 0.4:
             continue
+        if any({joint.parent, joint.child} & set(pair) for pair in robot.exclusions):
+            continue
+        it.move_frame(link.name, inverse(joint.T))
+        for each in robot.equalities:
+            if each.joins_links:
+                each.first = into.name if each.first == link.name else each.first
+                each.second = into.name if each.second == link.name else each.second
         if link.inertial is not None:
-            into.inertial = combined(into.inertial, link.inertial.moved(joint.T))
-        for shape in link.shapes:
-            shape.T = joint.T @ shape.T
-            into.shapes.append(shape)
-        for each in robot.children(link.name):
-            each.parent, each.T = into.name, joint.T @ each.T
+            into.inertial = combined(into.inertial, link.inertial)
+        into.shapes += link.shapes
+        for below in robot.children(link.name):
+            below.parent = into.name
         robot.joints = [each for each in robot.joints if each is not joint]
         del robot.links[link.name]
 
@@ -260,6 +500,8 @@ def reverse_axes(it: Rewritten, rng: np.random.Generator, floating: bool) -> Non
         if not joint.moves or rng.random() < 0.5:
             continue
         joint.axis = -joint.axis
+        joint.rest, joint.ref = -joint.rest, -joint.ref
+        reverse_couplings(it.robot, joint.name)
         it.signs[joint.name] = -it.signs.get(joint.name, 1)
         if joint.lower is not None and joint.upper is not None:
             joint.lower, joint.upper = -joint.upper, -joint.lower
@@ -270,10 +512,47 @@ def reverse_axes(it: Rewritten, rng: np.random.Generator, floating: bool) -> Non
                 other.mimic = (other.mimic[0], -other.mimic[1], other.mimic[2])
 
 
+def reverse_couplings(robot: Robot, joint: str) -> None:
+    """Reverse the sign of a joint's position in tendons, constraints, keyframes and actuators."""
+    for tendon in robot.tendons:
+        if joint in tendon.terms:
+            tendon.terms[joint] *= -1.0
+    for each in robot.equalities:
+        if each.kind == "joint" and each.first == joint:
+            each.polynomial = -each.polynomial
+        elif each.kind == "joint" and each.second == joint:
+            each.polynomial = each.polynomial * [1.0, -1.0, 1.0, -1.0, 1.0]
+    for key in robot.keyframes:
+        q = key.q[joint]
+        assert isinstance(q, float)
+        key.q[joint] = -q
+    for actuator in robot.actuators:
+        if not actuator.on_tendon and actuator.target == joint:
+            actuator.gear *= -1.0
+
+
 def rename(it: Rewritten, rng: np.random.Generator, floating: bool) -> None:
     """Give every joint another name."""
-    joints = {joint.name: f"j_{joint.name}" for joint in it.robot.joints}
-    for joint in it.robot.joints:
+    robot = it.robot
+    joints = {joint.name: f"j_{joint.name}" for joint in robot.joints}
+    for joint in robot.joints:
+        if robot.is_implied(joint.child):
+            below, old = robot.children(joint.child)[0], joint.child
+            joint.child = below.parent = f"j_{old}"
+            robot.links = {f"j_{name}" if name == old else name: each for name, each in robot.links.items()}
+            robot.links[joint.child].name = joint.child
+    for tendon in robot.tendons:
+        tendon.terms = {joints[name]: value for name, value in tendon.terms.items()}
+    for equality in robot.equalities:
+        if equality.kind == "joint":
+            equality.first = joints[equality.first]
+            equality.second = joints.get(equality.second, "")
+    for key in robot.keyframes:
+        key.q = {joints[name]: value for name, value in key.q.items()}
+    for actuator in robot.actuators:
+        if not actuator.on_tendon:
+            actuator.target = joints[actuator.target]
+    for joint in robot.joints:
         joint.name = joints[joint.name]
         if joint.mimic is not None:
             joint.mimic = (joints[joint.mimic[0]], *joint.mimic[1:])
@@ -303,7 +582,9 @@ def exchange_inertia(it: Rewritten, rng: np.random.Generator, floating: bool) ->
     robot = it.robot
     for joint in robot.joints:
         parent, child = robot.links[joint.parent], robot.links[joint.child]
-        if not joint.moves or joint.mimic is not None or child.inertial is None or parent.inertial is None:
+        if joint.type == "fixed" or joint.mimic is not None:
+            continue
+        if child.inertial is None or parent.inertial is None:
             continue
         if rng.random() < 0.5:
             continue
@@ -314,6 +595,10 @@ def exchange_inertia(it: Rewritten, rng: np.random.Generator, floating: bool) ->
             tensor = R @ np.diag(values) @ R.T
             less = _given(child, 0.0, np.zeros(3), -tensor)
             more = _given(parent, 0.0, np.zeros(3), T[:3, :3] @ tensor @ T[:3, :3].T)
+        elif joint.is_ball:
+            mass = 0.03 * child.inertial.mass
+            less = _given(child, -mass, np.zeros(3), np.zeros((3, 3)))
+            more = _given(parent, mass, T[:3, 3], np.zeros((3, 3)))
         else:
             mass = 0.03 * child.inertial.mass
             along = float(child.inertial.com @ joint.axis) * rng.uniform(0.5, 1.5)
@@ -338,8 +623,13 @@ REWRITES: dict[str, Callable[[Rewritten, np.random.Generator, bool], None]] = {
     "merge": merge_links,
     "reversed axes": reverse_axes,
     "null space": exchange_inertia,
+    "zero poses of balls": turn_zero_poses,
+    "offset links": offset_links,
+    "references": change_references,
     "names": rename,
 }
+MJCF_REWRITES = ("zero poses of balls", "offset links", "references")
+"""Rewrites for which the text has to be MJCF."""
 
 
 def draw_style(rng: np.random.Generator) -> Style:
@@ -352,6 +642,8 @@ def draw_style(rng: np.random.Generator) -> Style:
         rotation=int(rng.integers(4)),
         classes=bool(rng.random() < 0.5),
         sites=bool(rng.random() < 0.3),
+        free_joint=bool(rng.random() < 0.5),
+        quat_scale=float(rng.choice([1.0, -1.0, 0.4, -3.0])),
     )
 
 
@@ -363,6 +655,18 @@ def style_words(style: Style) -> list[str]:
 
 def fit_formats(robot: Robot, formats: set[Format]) -> str:
     """Remove from the robot what a format cannot say; return why it cannot be written at all."""
+    if formats != {"mjcf"}:
+        robot.exclusions, robot.contacts, robot.tendons, robot.equalities = [], [], [], []
+        robot.keyframes, robot.actuators = [], []
+    for joint in robot.joints:
+        if "urdf" in formats:
+            joint.stiffness = joint.rest = 0.0
+        if "sdf" in formats and joint.is_ball:
+            joint.upper, joint.damping, joint.friction = None, 0.0, 0.0
+        if formats != {"mjcf"}:
+            joint.armature = 0.0
+    if "urdf" in formats and any(joint.is_ball for joint in robot.joints):
+        return "a ball joint"
     if formats == {"urdf"}:
         return ""
     for link in robot.links.values():
@@ -413,6 +717,15 @@ PAIRS: tuple[tuple[Format, Format], ...] = (
 )
 
 
+def possible_formats(
+    robot: Robot, pairs: Sequence[tuple[Format, Format]], weights: Sequence[float]
+) -> tuple[list[tuple[Format, Format]], list[float]]:
+    """Return the pairs that can state the joints of the robot, with their weights."""
+    has_balls = any(joint.is_ball for joint in robot.joints)
+    kept = [i for i, pair in enumerate(pairs) if not (has_balls and "urdf" in pair)]
+    return [pairs[i] for i in kept], [weights[i] for i in kept]
+
+
 def compare(a: str, b: str, base: str | None, tolerance: float | None) -> tuple[Any, float]:
     """Return the report of dynx, and its time [s]."""
     import dynx
@@ -434,6 +747,8 @@ def attribute_words(report: Any) -> list[str]:
 def _is_altered(robot: Robot, formats: tuple[Format, Format], floating: bool, seed: int) -> bool:
     """Check whether an engine changes the robot itself as it loads the formats: MuJoCo drops inertial offsets
     below 1e-6, Drake replaces inertias that no body can have."""
+    if any(joint.is_ball for joint in robot.joints):
+        return False
     own = write_urdf(robot)
     return any(
         text_difference((robot, own, "urdf"), (robot, write(robot, to, floating), to), floating, seed) > 1e-8
@@ -446,13 +761,22 @@ def rewrite_row(seed: int) -> Row:
     rng = np.random.default_rng([1, seed])
     while True:
         name, robot, text, floating = draw_robot(rng)
-        formats = draw_formats(rng, PAIRS, (5, 2, 1, 1, 1.5, 0.5, 1))
+        pairs, weights = possible_formats(robot, PAIRS, (5, 2, 1, 4, 1.5, 0.5, 1))
+        formats = draw_formats(rng, pairs, weights)
+        if formats == ("mjcf", "mjcf"):
+            if any(joint.mimic is not None for joint in robot.joints):
+                continue
+            decorate(robot, rng, floating)
         if fit_formats(robot, set(formats)):
             continue
         it = Rewritten(robot.copy())
         chosen = [each for each in REWRITES if rng.random() < (0.1 if each == "names" else 0.35)]
+        if formats[1] != "mjcf":
+            chosen = [each for each in chosen if each not in MJCF_REWRITES]
         for each in chosen:
             REWRITES[each](it, rng, floating)
+        if formats[1] == "mjcf":
+            align_chains(it)
         style = draw_style(rng)
         original = formats == ("urdf", "urdf") and text is not None and rng.random() < 0.6
         try:
@@ -467,17 +791,17 @@ def rewrite_row(seed: int) -> Row:
             (it.robot, second, formats[1]),
             floating,
             seed,
-            it.signs,
-            it.names,
-            it.T_root,
+            it.by,
         )
         truth = f"{seen:.1e}"
+        if formats == ("mjcf", "mjcf"):
+            coupled, most = coupling_difference((robot, first), (it.robot, second), floating, seed, it.by)
+            if coupled > 1e-9:
+                seen, truth = max(seen, 1e3 * coupled), f"{coupled:.1e} {most}"
         wrong = seen > (1e-6 if "mjcf" in formats else 1e-8)
         if wrong and formats != ("urdf", "urdf") and _is_altered(robot, formats, floating, seed):
             own, other = write_urdf(robot), write_urdf(it.robot)
-            seen = text_difference(
-                (robot, own, "urdf"), (it.robot, other, "urdf"), floating, seed, it.signs, it.names, it.T_root
-            )
+            seen = text_difference((robot, own, "urdf"), (it.robot, other, "urdf"), floating, seed, it.by)
             truth, wrong = f"{seen:.1e} in URDF", seen > 1e-8
     except Exception as error:  # an engine refuses the text: the robot is not checked
         truth, wrong = f"unchecked: {str(error).splitlines()[0][:80]}", False
