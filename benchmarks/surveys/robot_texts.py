@@ -267,6 +267,10 @@ class Robot:
         """Whether a constraint depends on the pose of the file."""
         return any(each.kind == "connect" for each in self.equalities)
 
+    def is_static(self, link: str) -> bool:
+        """Whether no joint but fixed ones stands between a link and the root."""
+        return self.root in self.body(link)
+
     def is_implied(self, link: str) -> bool:
         """Whether a link is one that MJCF does not write: it stands between two joints of one body."""
         above, below = self.above(link), self.children(link)
@@ -275,7 +279,11 @@ class Robot:
         return named and len(below) == 1 and own.inertial is None and not own.shapes
 
     def chain(self, joint: Joint) -> list[Joint]:
-        """Return the joints of one body of MJCF, from the first on; a fixed joint may be the last."""
+        """Return the joints of the body of MJCF that has a joint; a fixed joint may be the last."""
+        while self.is_implied(joint.parent) and not np.any(joint.T[:3, :3] != np.eye(3)):
+            above = self.above(joint.parent)
+            assert above is not None
+            joint = above
         found = [joint]
         while found[-1].type != "fixed" and self.is_implied(found[-1].child):
             below = self.children(found[-1].child)[0]

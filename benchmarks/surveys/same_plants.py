@@ -1,7 +1,8 @@
-"""Planted differences of 42 kinds for the survey of ``dynx same``, and the elements they change."""
+"""Planted differences of 79 kinds for the survey of ``dynx same``, and the elements they change."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -20,24 +21,30 @@ from benchmarks.surveys.robot_texts import (
     pose,
     rotation_from_rpy,
     write,
-    write_urdf,
 )
 from benchmarks.surveys.robot_truth import line_difference, text_difference
 from benchmarks.surveys.same_rewrites import (
     TOLERANCE,
     Rewritten,
     Row,
+    align_chains,
     attribute_words,
+    change_references,
     compare,
+    decorate,
     draw_formats,
     draw_robot,
     draw_style,
     fit_formats,
     move_frames,
+    offset_links,
+    possible_formats,
     random_inertial,
+    rename_joints,
     reverse_axes,
     style_words,
     turn_inertias,
+    turn_zero_poses,
 )
 
 
@@ -45,7 +52,7 @@ from benchmarks.surveys.same_rewrites import (
 class Planted:
     """Where a difference was planted: names of the element, and what the report is to call it.
 
-    `part` is a part of an element, "attribute KIND" or "unmatched". `link` and `joint` are accepted names.
+    `part` is a part of an element, "attribute KIND", "unmatched", or "nothing" where the robot is the same.
     """
 
     part: str
@@ -151,6 +158,8 @@ def _origin(i: int, turn: bool) -> Plant:
         E = np.eye(3)[i] * size
         joint.T = joint.T @ pose(rotation_from_rpy(E)) if turn else pose(None, E * robot.reach) @ joint.T
         names = {joint.name, f"{joint.child}_fixed", joint.child}
+        if any(robot.is_implied(each) for each in (joint.parent, joint.child)):
+            names |= {name for each in robot.chain(joint) for name in (each.name, each.child)}
         only_frame = all(robot.links[each].is_empty for each in robot.below(joint))
         if only_frame and fixed and not any(robot.above(each).moves for each in robot.below(joint)):  # type: ignore[union-attr]
             return Planted("attribute frame", names | robot.below(joint))
@@ -282,7 +291,7 @@ def _beside(robot: Robot, name: str) -> set[str]:
     own = robot.body(name)
     found: set[str] = set()
     for joint in robot.joints:
-        if joint.moves and (joint.parent in own or joint.child in own):
+        if joint.type != "fixed" and (joint.parent in own or joint.child in own):
             found |= robot.body(joint.parent) | robot.body(joint.child)
     return found
 
@@ -293,8 +302,12 @@ def _filter(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
         names = [name for name, link in robot.links.items() if any(not each.visual for each in link.shapes)]
         # MuJoCo tests no shapes of one body, or of two that a joint connects: a filter is nothing there.
         apart = {name: robot.body(name) | _beside(robot, name) for name in names}
+        there = [set(pair) for pair in robot.exclusions]
         pairs = [
-            (a, b) for a in names for b in names if a < b and b not in apart[a] and "world" not in (a, b)
+            (a, b)
+            for a in names
+            for b in names
+            if a < b and b not in apart[a] and "world" not in (a, b) and {a, b} not in there
         ]
         pair = _pick(rng, pairs)
         robot.exclusions.append(pair)
@@ -310,6 +323,244 @@ def _gear(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
     joint = _pick(rng, [each for each in robot.joints if each.moves])
     joint.gear = 1.0 + size
     return Planted("attribute actuator", {joint.name, "motor_" + joint.name})
+
+
+@plant("contact pair", ("mjcf",))
+def _contact_pair(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    """Let shapes touch that MuJoCo does not test otherwise: those of two links that a joint connects."""
+    found = []
+    for joint in robot.joints:
+        above, below = robot.links[joint.parent], robot.links[joint.child]
+        first = [each for each in above.shapes if not each.visual]
+        second = [each for each in below.shapes if not each.visual]
+        if joint.type != "fixed" and first and second and not robot.is_static(joint.parent):
+            found.append((joint, first[0], second[0]))
+    joint, *shapes = _pick(rng, found)
+    robot.contacts.append((shapes[0], shapes[1]))
+    return Planted("attribute contact filter", robot.body(joint.parent) | robot.body(joint.child))
+
+
+@plant("joint point", ("mjcf",))
+def _joint_point(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    """Move a joint in its body, which stays: `pos` of a joint of MJCF."""
+    joint = _pick(
+        rng, [each for each in robot.joints if each.type != "fixed" and robot.is_implied(each.child)]
+    )
+    below = robot.children(joint.child)[0]
+    d = rng.normal(size=3)
+    d *= size * robot.reach / np.linalg.norm(d)
+    joint.T, below.T = joint.T @ pose(None, d), pose(None, -d) @ below.T
+    names = {name for each in robot.chain(joint) for name in (each.name, each.child)}
+    return Planted("origin", names, True)
+
+
+@plant("ball centre", ("mjcf", "sdf"))
+def _ball_centre(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    joint = _pick(rng, [each for each in robot.joints if each.is_ball])
+    joint.T = pose(None, np.eye(3)[rng.integers(3)] * size * robot.reach) @ joint.T
+    return Planted("origin", {joint.name, joint.child}, True)
+
+
+@plant("ball zero pose", ("mjcf",))
+def _ball_zero_pose(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    """Turn the zero pose of a ball joint, and keyframes back: only a limit is another one then."""
+    found = [each for each in robot.joints if each.is_ball and not robot.is_implied(each.parent)]
+    if robot.has_connect:
+        raise NotHereError
+    joint = _pick(rng, found)
+    axis = rng.normal(size=3)
+    R = axis_angle(axis / np.linalg.norm(axis), size)
+    joint.T = joint.T @ pose(R)
+    Rewritten(robot).turn_ball(joint.name, R, np.eye(3))
+    return Planted("nothing" if joint.upper is None else "attribute upper limit", {joint.name})
+
+
+def _ball_value(name: str, kind: str) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        joint = _pick(rng, [each for each in robot.joints if each.is_ball])
+        value = getattr(joint, name)
+        if value is None:
+            raise NotHereError
+        setattr(joint, name, value + size * (value or 1.0))
+        return Planted(f"attribute {kind}", {joint.name})
+
+    return change
+
+
+plant("ball range", ("mjcf",))(_ball_value("upper", "upper limit"))
+for _name in ("damping", "friction", "armature"):
+    plant(f"ball {_name}", ("mjcf",))(_ball_value(_name, _name))
+
+
+def _spring(name: str, kind: str) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        joint = _pick(rng, [each for each in robot.joints if each.moves and each.stiffness])
+        setattr(joint, name, getattr(joint, name) + size)
+        return Planted(f"attribute {kind}", {joint.name})
+
+    return change
+
+
+plant("stiffness", ("mjcf", "sdf"))(_spring("stiffness", "stiffness"))
+plant("spring reference", ("mjcf", "sdf"))(_spring("rest", "spring reference"))
+
+
+def _interval(given: tuple[float, float], rng: np.random.Generator, size: float) -> tuple[float, float]:
+    """Return an interval with one end moved outwards."""
+    low, high = given
+    width = size * (high - low)
+    return (low - width, high) if rng.random() < 0.5 else (low, high + width)
+
+
+def _tendon_value(name: str) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        tendon = _pick(rng, robot.tendons)
+        if name == "range":
+            if tendon.range is None:
+                raise NotHereError
+            tendon.range = _interval(tendon.range, rng, size)
+        elif name == "coefficient":
+            joint = _pick(rng, list(tendon.terms))
+            tendon.terms[joint] *= 1.0 + size
+        elif name == "member":
+            others = [each.name for each in robot.joints if each.moves and each.name not in tendon.terms]
+            coefficient = tendon.terms.pop(_pick(rng, list(tendon.terms)))
+            tendon.terms[_pick(rng, others)] = coefficient
+        else:
+            value = getattr(tendon, name)
+            setattr(tendon, name, value + size * (value or 1.0))
+        return Planted("attribute tendon", {tendon.name})
+
+    return change
+
+
+for _name in ("coefficient", "member", "range", "stiffness", "rest", "damping", "friction"):
+    plant(f"tendon {_name}", ("mjcf",))(_tendon_value(_name))
+
+
+@plant("tendon missing", ("mjcf",))
+def _tendon_missing(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    used = {each.target for each in robot.actuators if each.on_tendon}
+    used |= {name for each in robot.equalities if each.kind == "tendon" for name in (each.first, each.second)}
+    tendon = _pick(rng, [each for each in robot.tendons if each.name not in used])
+    robot.tendons.remove(tendon)
+    return Planted("attribute tendon", {tendon.name})
+
+
+def _equality_value(name: str, kinds: tuple[str, ...]) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        each = _pick(rng, [each for each in robot.equalities if each.kind in kinds])
+        d = rng.normal(size=3)
+        d /= np.linalg.norm(d)
+        if name == "anchor":
+            each.anchor = each.anchor + size * robot.reach * d
+        elif name == "point":
+            each.T = pose(None, size * robot.reach * d) @ each.T
+        elif name == "attitude":
+            each.T = each.T @ pose(axis_angle(d, size))
+        elif name == "torque scale":
+            each.torque_scale *= 1.0 + size
+        elif name == "polynomial":
+            degree = rng.integers(5 if each.second else 1)
+            change = np.eye(5)[degree] * size * (np.max(np.abs(each.polynomial)) or 1.0)
+            each.polynomial = each.polynomial + change
+        elif name == "softness":
+            each.time_constant *= 1.0 + size
+        elif name == "link":
+            own = robot.body(each.first) | robot.body(each.second)
+            heavy = [name for name, link in robot.links.items() if not link.is_empty and name != "world"]
+            each.second = _pick(rng, [name for name in heavy if name not in own])
+        else:
+            each.active = not each.active
+        return Planted("attribute equality", {each.name})
+
+    return change
+
+
+_ALL_KINDS = ("connect", "weld", "joint", "tendon")
+for _name, _kinds in (
+    ("anchor", ("connect", "weld")),
+    ("point", ("weld",)),
+    ("attitude", ("weld",)),
+    ("torque scale", ("weld",)),
+    ("polynomial", ("joint", "tendon")),
+    ("softness", _ALL_KINDS),
+    ("link", ("connect", "weld")),
+    ("activity", _ALL_KINDS),
+):
+    plant(f"equality {_name}", ("mjcf",))(_equality_value(_name, _kinds))
+
+
+@plant("equality missing", ("mjcf",))
+def _equality_missing(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    missing = _pick(rng, robot.equalities)
+    robot.equalities = [each for each in robot.equalities if each is not missing]
+    return Planted("attribute equality", {missing.name})
+
+
+@plant("keyframe position", ("mjcf",))
+def _keyframe_position(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    key = _pick(rng, robot.keyframes)
+    joint = _pick(rng, [each for each in robot.joints if each.moves])
+    key.q[joint.name] += size * (robot.reach if joint.type == "prismatic" else 1.0)
+    return Planted("attribute configuration", {key.name})
+
+
+@plant("keyframe attitude", ("mjcf",))
+def _keyframe_attitude(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    key, joint = _pick(rng, robot.keyframes), _pick(rng, [each for each in robot.joints if each.is_ball])
+    axis = rng.normal(size=3)
+    key.q[joint.name] = key.q[joint.name] @ axis_angle(axis / np.linalg.norm(axis), size)
+    return Planted("attribute configuration", {key.name})
+
+
+@plant("keyframe base", ("mjcf",))
+def _keyframe_base(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    # Keyframes of a fixed base have the pose of no base.
+    key = _pick(rng, [each for each in robot.keyframes if np.any(each.T_world_root != np.eye(4))])
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    turns = rng.random() < 0.5
+    key.T_world_root = key.T_world_root @ pose(
+        axis_angle(axis, size) if turns else None, None if turns else size * robot.reach * axis
+    )
+    return Planted("attribute configuration", {key.name})
+
+
+@plant("keyframe missing", ("mjcf",))
+def _keyframe_missing(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    key = _pick(rng, robot.keyframes)
+    robot.keyframes = [each for each in robot.keyframes if each is not key]
+    return Planted("attribute configuration", {key.name})
+
+
+def _actuator_value(name: str) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        actuator = _pick(rng, robot.actuators)
+        names = {actuator.name, actuator.target}
+        if name.endswith("range"):
+            attribute = name.replace(" ", "_")
+            if getattr(actuator, attribute) is None:
+                raise NotHereError
+            setattr(actuator, attribute, _interval(getattr(actuator, attribute), rng, size))
+        elif name == "target":
+            joints = [each.name for each in robot.joints if each.moves]
+            taken = [each.name for each in robot.tendons] if actuator.on_tendon else joints
+            actuator.target = _pick(rng, [each for each in taken if each != actuator.target])
+            names.add(actuator.target)
+        elif name == "missing":
+            robot.actuators = [each for each in robot.actuators if each is not actuator]
+        elif name == "gain" and actuator.kind == "motor":
+            raise NotHereError
+        else:
+            setattr(actuator, name, getattr(actuator, name) * (1.0 + size))
+        return Planted("attribute actuator", names)
+
+    return change
+
+
+for _name in ("gain", "gear", "ctrl range", "force range", "target", "missing"):
+    plant(f"actuator {_name} of a servo", ("mjcf",))(_actuator_value(_name))
 
 
 @plant("link missing")
@@ -371,10 +622,8 @@ def _parent(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
 @plant("joint name")
 def _joint_name(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
     joint = _pick(rng, [each for each in robot.joints if each.moves])
-    old, joint.name = joint.name, "renamed_joint"
-    for each in robot.joints:
-        if each.mimic is not None and each.mimic[0] == old:
-            each.mimic = (joint.name, *each.mimic[1:])
+    old = joint.name
+    rename_joints(robot, {old: "renamed_joint"})
     return Planted("attribute name", {old, joint.name})
 
 
@@ -386,6 +635,10 @@ def _link_name(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
     for joint in robot.joints:
         joint.parent = "renamed_link" if joint.parent == name else joint.parent
         joint.child = "renamed_link" if joint.child == name else joint.child
+    names = {name: "renamed_link"}
+    robot.exclusions = [(names.get(a, a), names.get(b, b)) for a, b in robot.exclusions]
+    for each in robot.equalities:
+        each.first, each.second = names.get(each.first, each.first), names.get(each.second, each.second)
     return Planted("attribute name", {name, "renamed_link"})
 
 
@@ -398,9 +651,16 @@ def _frame(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
 
 
 def seen_size(before: Robot, after: Robot, floating: bool, seed: int) -> tuple[float, float]:
-    """Return the differences that Pinocchio sees, and that of the joint lines."""
-    texts = write_urdf(before), write_urdf(after)
-    seen = text_difference((before, texts[0], "urdf"), (after, texts[1], "urdf"), floating, seed)
+    """Return the difference that an engine sees, and that of the joint lines.
+
+    The engine is MuJoCo if a joint is a ball joint, else Pinocchio.
+    """
+    to: Format = "mjcf" if any(joint.is_ball for joint in before.joints) else "urdf"
+    it = Rewritten(after.copy())
+    if to == "mjcf":
+        align_chains(it)
+    texts = write(before, to, floating), write(it.robot, to, floating)
+    seen = text_difference((before, texts[0], to), (it.robot, texts[1], to), floating, seed, it.by)
     return seen, line_difference(before, after)
 
 
@@ -411,6 +671,8 @@ PAIRS: tuple[tuple[Format, Format], ...] = (
     ("urdf", "mjcf"),
     ("urdf", "sdf"),
     ("mjcf", "urdf"),
+    ("mjcf", "sdf"),
+    ("sdf", "mjcf"),
 )
 SEEN = 1e-10
 """Relative change of torques or joint lines from which a difference is to be found."""
@@ -432,7 +694,14 @@ def plant_row(seed: int) -> Row:
             {("urdf", "urdf"): 6.0, ("mjcf", "mjcf"): 1.5, ("sdf", "sdf"): 1.0}.get(pair, 0.7)
             for pair in pairs
         ]
+        pairs, weights = possible_formats(robot, pairs, weights)
+        if not pairs:
+            continue
         formats = draw_formats(rng, pairs, weights)
+        if formats == ("mjcf", "mjcf"):
+            if any(joint.mimic is not None for joint in robot.joints):
+                continue
+            decorate(robot, rng, floating)
         if fit_formats(robot, set(formats)):
             continue
         if kind == "actuator gear":
@@ -446,15 +715,20 @@ def plant_row(seed: int) -> Row:
         except NotHereError:
             continue
         it = Rewritten(after.copy())
-        steps = [step for step in (move_frames, turn_inertias, reverse_axes) if rng.random() < 0.25]
+        freedoms = [move_frames, turn_inertias, reverse_axes]
+        if formats[1] == "mjcf":
+            freedoms += [turn_zero_poses, offset_links, change_references]
+        steps = [step for step in freedoms if rng.random() < 0.25]
         if kind in ("link missing", "link added"):
             steps = []
-        if kind in ("joint type", "axis") and move_frames in steps:
+        if kind in ("joint type", "axis"):
             # A frame that was moved across a slide would not lie on the axis of the joint that turns, nor one
             # that was moved along a turned axis on the right one: then one element does not mend the robot.
-            steps.remove(move_frames)
+            steps = [step for step in steps if step not in (move_frames, offset_links)]
         for step in steps:
             step(it, rng, floating)
+        if formats[1] == "mjcf":
+            align_chains(it)
         style = draw_style(rng)
         original = formats == ("urdf", "urdf") and text is not None and rng.random() < 0.6
         try:
@@ -472,6 +746,8 @@ def plant_row(seed: int) -> Row:
                 elif max(seen, moved) < SEEN:
                     continue  # below what has to be found
             except Exception as error:
+                if any(joint.is_ball for joint in robot.joints):
+                    continue  # MuJoCo refuses inertias that no body can have
                 truth = f"unchecked: {str(error).splitlines()[0][:80]}"
         elif planted.inertial:
             try:
@@ -489,7 +765,15 @@ def plant_row(seed: int) -> Row:
     try:
         report, seconds = compare(first, second, base if set(formats) == {"urdf"} else None, TOLERANCE)
         outcome = judged(
-            report, planted, expected, (robot, first, formats[0]), (after, it), formats[1], floating, seed
+            report,
+            planted,
+            expected,
+            (robot, first, formats[0]),
+            (after, it),
+            second,
+            formats[1],
+            floating,
+            seed,
         )
     except Exception as error:
         outcome = f"error: {type(error).__name__}: {str(error)[:300]}"
@@ -534,12 +818,37 @@ def _held_size(before: Robot, after: Robot, floating: bool, seed: int) -> float:
     return seen_size(before, after, floating, seed)[0]
 
 
+TAGS = {
+    "tendon": ("fixed",),
+    "equality": ("connect", "weld", "joint", "tendon"),
+    "configuration": ("key",),
+    "actuator": ("motor", "position", "velocity"),
+}
+"""Elements of MJCF by the kind of an attribute."""
+
+
+def is_at_its_line(attribute: Any, text: str) -> bool:
+    """Check that the line of an attribute is one of the element that it names, if that is one of `TAGS`."""
+    rows = text.splitlines()
+    if (
+        attribute.second == "none"
+        or attribute.kind not in TAGS
+        or attribute.theirs is None
+        or attribute.second_line is None
+    ):
+        return True
+    found = re.match(r"\s*<(\w+)", rows[attribute.second_line - 1])
+    names = f'"{attribute.theirs}"' in rows[attribute.second_line - 1]
+    return found is not None and found[1] in TAGS[attribute.kind] and names
+
+
 def judged(
     report: Any,
     planted: Planted,
     expected: str,
     a: tuple[Robot, str, Format],
     b: tuple[Robot, Rewritten],
+    b_text: str,
     to: Format,
     floating: bool,
     seed: int,
@@ -551,6 +860,8 @@ def judged(
     unmatched = [f"{each.kind} {each.ours}/{each.theirs}" for each in report.unmatched]
     attributes = attribute_words(report)
     told = "; ".join([*elements, *unmatched, *attributes])[:300] or "nothing"
+    if expected == "nothing":
+        return "right" if report.same and not (elements or unmatched or attributes) else f"false: {told}"
     if expected == "null space":
         if report.same and not elements and not unmatched:
             return "right (null space)"
@@ -576,6 +887,8 @@ def judged(
             return f"missed: {told}"
         if elements or unmatched or not report.same:
             return f"false: {told}"
+        if not all(is_at_its_line(each, b_text) for each in named):
+            return f"misplaced at line {named[0].second_line}: {told}"
         return "right" if len(named) == len(report.attributes) else f"extra: {told}"
     if report.same:
         return f"missed: {told}"
