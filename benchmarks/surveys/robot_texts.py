@@ -484,6 +484,8 @@ class Style:
     """A floating base of MJCF by `<joint type="free">`."""
     quat_scale: float = 1.0
     """Factor of quaternions in keyframes of MJCF; none is a difference."""
+    includes: bool = False
+    """Some sections of MJCF are in other files (`split_file`)."""
 
 
 def exponential(value: float) -> str:
@@ -930,6 +932,29 @@ def _write_keyframes(root: ET.Element, robot: Robot, floating: bool, style: Styl
         keys = list(section)
         style.shuffle.shuffle(keys)
         section[:] = keys
+
+
+def split_file(text: str) -> tuple[str, dict[str, str]]:
+    """Return MJCF with every second section, and the contents of every second body, in files of their own."""
+    root, parts = ET.fromstring(text), {}
+
+    def move_out(parent: ET.Element, children: list[ET.Element]) -> None:
+        name = f"part_{len(parts)}.xml"
+        at = list(parent).index(children[0])
+        part = ET.Element("mujocoinclude")
+        part.extend(children)
+        for child in children:
+            parent.remove(child)
+        parent.insert(at, ET.Element("include", file=name))
+        ET.indent(part)
+        parts[name] = ET.tostring(part, encoding="unicode") + "\n"
+
+    bodies = [body for body in root.iter("body") if len(body) > 1]
+    for body in bodies[:2]:
+        move_out(body, list(body)[1:])
+    for section in [each for each in root if each.tag in ("default", "tendon", "keyframe", "equality")][::2]:
+        move_out(root, [section])
+    return _finished(root), parts
 
 
 def write_sdf(robot: Robot, floating: bool, style: Style | None = None) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from benchmarks.surveys.robot_texts import (
     inverse,
     pose,
     rotation_from_rpy,
+    split_file,
     write,
 )
 from benchmarks.surveys.robot_truth import line_difference, text_difference
@@ -36,6 +38,7 @@ from benchmarks.surveys.same_rewrites import (
     draw_robot,
     draw_style,
     fit_formats,
+    is_split,
     move_frames,
     offset_links,
     possible_formats,
@@ -763,7 +766,9 @@ def plant_row(seed: int) -> Row:
     base = "floating" if floating else "fixed"
     seconds = 0.0
     try:
-        report, seconds = compare(first, second, base if set(formats) == {"urdf"} else None, TOLERANCE)
+        report, seconds = compare(
+            first, second, base if set(formats) == {"urdf"} else None, TOLERANCE, is_split(formats, style)
+        )
         outcome = judged(
             report,
             planted,
@@ -771,6 +776,7 @@ def plant_row(seed: int) -> Row:
             (robot, first, formats[0]),
             (after, it),
             second,
+            is_split(formats, style),
             formats[1],
             floating,
             seed,
@@ -827,8 +833,11 @@ TAGS = {
 """Elements of MJCF by the kind of an attribute."""
 
 
-def is_at_its_line(attribute: Any, text: str) -> bool:
+def is_at_its_line(attribute: Any, text: str, includes: bool) -> bool:
     """Check that the line of an attribute is one of the element that it names, if that is one of `TAGS`."""
+    if includes:
+        text, parts = split_file(text)
+        text = parts.get(Path(attribute.second_file or "").name, text)
     rows = text.splitlines()
     if (
         attribute.second == "none"
@@ -837,6 +846,8 @@ def is_at_its_line(attribute: Any, text: str) -> bool:
         or attribute.second_line is None
     ):
         return True
+    if attribute.second_line > len(rows):
+        return False
     found = re.match(r"\s*<(\w+)", rows[attribute.second_line - 1])
     names = f'"{attribute.theirs}"' in rows[attribute.second_line - 1]
     return found is not None and found[1] in TAGS[attribute.kind] and names
@@ -849,6 +860,7 @@ def judged(
     a: tuple[Robot, str, Format],
     b: tuple[Robot, Rewritten],
     b_text: str,
+    includes: bool,
     to: Format,
     floating: bool,
     seed: int,
@@ -887,7 +899,7 @@ def judged(
             return f"missed: {told}"
         if elements or unmatched or not report.same:
             return f"false: {told}"
-        if not all(is_at_its_line(each, b_text) for each in named):
+        if not all(is_at_its_line(each, b_text, includes) for each in named):
             return f"misplaced at line {named[0].second_line}: {told}"
         return "right" if len(named) == len(report.attributes) else f"extra: {told}"
     if report.same:

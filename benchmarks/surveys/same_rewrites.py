@@ -27,6 +27,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,7 @@ from benchmarks.surveys.robot_texts import (
     read_urdf,
     rotation_from_rpy,
     shifted_tensor,
+    split_file,
     write,
     write_urdf,
 )
@@ -650,13 +652,15 @@ def draw_style(rng: np.random.Generator) -> Style:
         sites=bool(rng.random() < 0.3),
         free_joint=bool(rng.random() < 0.5),
         quat_scale=float(rng.choice([1.0, -1.0, 0.4, -3.0])),
+        includes=bool(rng.random() < 0.25),
     )
 
 
 def style_words(style: Style) -> list[str]:
     """Return the freedoms that a style uses, in words."""
     words = ["defaults spelled out" if style.spelled else "defaults removed"]
-    return words + ["order"] * (style.shuffle is not None) + ["degrees"] * style.degree
+    words += ["order"] * (style.shuffle is not None) + ["degrees"] * style.degree
+    return words + ["includes"] * style.includes
 
 
 def fit_formats(robot: Robot, formats: set[Format]) -> str:
@@ -687,6 +691,11 @@ def fit_formats(robot: Robot, formats: set[Format]) -> str:
             joint.effort = joint.effort or 1.0
             joint.velocity = joint.velocity or 1.0
     return ""
+
+
+def is_split(formats: tuple[Format, Format], style: Style) -> bool:
+    """Check whether the text of the second robot is split into files."""
+    return style.includes and formats[1] == "mjcf"
 
 
 @dataclass(frozen=True)
@@ -732,8 +741,16 @@ def possible_formats(
     return [pairs[i] for i in kept], [weights[i] for i in kept]
 
 
-def compare(a: str, b: str, base: str | None, tolerance: float | None) -> tuple[Any, float]:
-    """Return the report of dynx, and its time [s]."""
+def compare(
+    a: str, b: str, base: str | None, tolerance: float | None, includes: bool = False
+) -> tuple[Any, float]:
+    """Return the report of dynx, and its time [s]; with `includes`, b is split into files."""
+    if includes:
+        with TemporaryDirectory() as folder:
+            b, parts = split_file(b)
+            for name, text in (*parts.items(), ("robot.xml", b)):
+                (Path(folder) / name).write_text(text, encoding="utf-8")
+            return compare(a, str(Path(folder) / "robot.xml"), base, tolerance)
     import dynx
 
     start = time.perf_counter()
@@ -823,7 +840,9 @@ def rewrite_row(seed: int) -> Row:
         outcome = "generator wrong"
     else:
         try:
-            report, seconds = compare(first, second, base if set(formats) == {"urdf"} else None, None)
+            report, seconds = compare(
+                first, second, base if set(formats) == {"urdf"} else None, None, is_split(formats, style)
+            )
             attributes = attribute_words(report)
             if it.renamed:
                 attributes = [each for each in attributes if not each.startswith("name of")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.surveys.robot_texts import Robot, write
+from benchmarks.surveys.robot_texts import Robot, split_file, write
 from benchmarks.surveys.robot_truth import coupling_difference, text_difference
 from benchmarks.surveys.same_plants import PLANTS, SEEN, NotHereError, seen_size
 from benchmarks.surveys.same_rewrites import (
@@ -63,6 +63,19 @@ def test_a_planted_difference_shows_in_mujoco(kind: str) -> None:
     texts = [write(each, "mjcf", True) for each in (robot, after)]
     by = Rewritten(robot).by
     assert coupling_difference((robot, texts[0]), (after, texts[1]), True, 0, by)[0] > SEEN
+
+
+def test_a_file_that_is_split_compiles_to_the_same_robot() -> None:
+    text = write(ball_robot(0, True), "mjcf", True)
+    main, parts = split_file(text)
+    models = [
+        mujoco.MjModel.from_xml_string(text),
+        mujoco.MjModel.from_xml_string(main, {name: part.encode() for name, part in parts.items()}),
+    ]
+    assert len(parts) > 2
+    for name in ("body_inertia", "geom_pos", "jnt_pos", "tendon_range", "eq_data", "key_qpos"):
+        first, second = (getattr(model, name) for model in models)
+        np.testing.assert_array_equal(first, second)
 
 
 def test_a_moved_ball_joint_shows_in_mujoco() -> None:
