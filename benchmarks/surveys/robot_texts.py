@@ -484,6 +484,12 @@ class Style:
     """A floating base of MJCF by `<joint type="free">`."""
     quat_scale: float = 1.0
     """Factor of quaternions in keyframes of MJCF; none is a difference."""
+    constraint_sites: bool = False
+    """Constraints of MJCF between sites, not links."""
+    general: bool = False
+    """Actuators of MJCF as `general`."""
+    frames: bool = False
+    """Bodies and shapes of MJCF inside of `frame`."""
     includes: bool = False
     """Some sections of MJCF are in other files (`split_file`)."""
 
@@ -661,7 +667,35 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
         else:
             element.set("quat", _text(style, quat_wxyz(R)))
 
+    def framed(body: ET.Element, tag: str, T: Matrix) -> ET.Element:
+        """Add a child at a pose, which a frame around it may state in part."""
+        if style.frames:
+            body = ET.SubElement(body, "frame")
+            T_frame = pose(axis_angle(np.array([0.6, 0.0, 0.8]), 1.0), np.array([0.1, -0.2, 0.3]))
+            place(body, T_frame)
+            T = inverse(T_frame) @ T
+        child = ET.SubElement(body, tag)
+        place(child, T)
+        return child
+
+    poses = robot.poses()
+
+    def add_constraint_sites(body: ET.Element, link: str) -> None:
+        """Add the sites of the constraints of a link."""
+        for each in robot.equalities:
+            if each.joins_links and each.first == link:
+                at = each.T if each.kind == "weld" else pose(None, each.anchor)
+                place(ET.SubElement(body, "site", name=f"{each.name}_first"), at)
+            if each.joins_links and each.second == link:
+                at = pose(None, each.anchor)
+                if each.kind == "connect":
+                    # The points coincide in the pose of the file.
+                    at = inverse(poses[each.second]) @ poses[each.first] @ at
+                place(ET.SubElement(body, "site", name=f"{each.name}_second"), at)
+
     def fill(body: ET.Element, link: Link) -> None:
+        if style.constraint_sites:
+            add_constraint_sites(body, link.name)
         if link.inertial is not None and (link.inertial.mass or np.any(link.inertial.tensor)):
             own = link.inertial
             inertial = ET.SubElement(body, "inertial", mass=style.number(float(own.mass)))
@@ -694,10 +728,10 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
                     ),
                 )
         for shape in link.shapes:
-            geom = ET.SubElement(body, "geom", type=shape.kind)
+            geom = framed(body, "geom", shape.T)
+            geom.set("type", shape.kind)
             if id(shape) in contact_names:
                 geom.set("name", contact_names[id(shape)])
-            place(geom, shape.T)
             size = list(shape.size)
             if shape.kind == "box":
                 size = [each / 2.0 for each in size]
@@ -724,14 +758,14 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
                 continue
             chain = robot.chain(joint)
             link, T = robot.links[chain[-1].child], np.eye(4)
-            inner = ET.SubElement(body, "body", name=link.name)
             elements = []
             for each in reversed(chain):
                 T = each.motion(each.ref) @ T
                 if each.type != "fixed":
                     elements.append(joint_element(each, inverse(T)))
                 T = each.T @ T
-            place(inner, T)
+            inner = framed(body, "body", T)
+            inner.set("name", link.name)
             inner.extend(reversed(elements))
             fill(inner, link)
             descend(inner, link.name)
@@ -821,7 +855,7 @@ def _hoist(style: Style, root: ET.Element, elements: list[ET.Element], tag: str,
         default = ET.SubElement(default, "default", {"class": f"usual_{tag}"})
         for each in elements:
             each.set("class", f"usual_{tag}")
-    shared = ET.SubElement(default, tag)
+    shared = ET.SubElement(default, "general" if elements[0].tag == "general" else tag)
     for name in set.intersection(*(set(each.attrib) for each in elements)) - own - {"name", "class"}:
         value = elements[0].attrib[name]
         shared.set(name, value)
@@ -860,6 +894,11 @@ def _write_couplings(root: ET.Element, robot: Robot, style: Style) -> None:
         elements.append(element)
         element.set("active", "true" if each.active else "false")
         element.set("solref", f"{number(float(each.time_constant))} 1")
+        if each.joins_links and style.constraint_sites:
+            element.attrib.update(site1=f"{each.name}_first", site2=f"{each.name}_second")
+            if each.kind == "weld":
+                element.set("torquescale", number(float(each.torque_scale)))
+            continue
         if each.joins_links:
             element.attrib.update(body1=each.first, body2=each.second, anchor=_text(style, each.anchor))
             if each.kind == "weld":
@@ -890,9 +929,14 @@ def _write_couplings(root: ET.Element, robot: Robot, style: Style) -> None:
         for actuator in (*motors, *robot.actuators):
             if actuator.kind != kind:
                 continue
-            element = ET.SubElement(section, kind, name=actuator.name, gear=number(float(actuator.gear)))
+            tag = "general" if style.general else kind
+            element = ET.SubElement(section, tag, name=actuator.name, gear=number(float(actuator.gear)))
             element.set("tendon" if actuator.on_tendon else "joint", actuator.target)
-            if kind != "motor":
+            if style.general and kind != "motor":
+                gains = [0.0, -actuator.gain, 0.0] if kind == "position" else [0.0, 0.0, -actuator.gain]
+                element.attrib.update(gainprm=number(float(actuator.gain)), biastype="affine")
+                element.set("biasprm", _text(style, gains))
+            elif kind != "motor":
                 element.set("kp" if kind == "position" else "kv", number(float(actuator.gain)))
             for name, limits in (("ctrl", actuator.ctrl_range), ("force", actuator.force_range)):
                 element.set(f"{name}limited", "false" if limits is None else "true")
@@ -902,7 +946,7 @@ def _write_couplings(root: ET.Element, robot: Robot, style: Style) -> None:
         _hoist(style, root, elements, kind, {"joint", "tendon"})
 
 
-_ENDS = {f"{kind}{i}" for kind in ("body", "joint", "tendon") for i in (1, 2)}
+_ENDS = {f"{kind}{i}" for kind in ("body", "site", "joint", "tendon") for i in (1, 2)}
 """Attributes of a constraint that name what it couples."""
 
 
@@ -918,7 +962,8 @@ def _write_keyframes(root: ET.Element, robot: Robot, floating: bool, style: Styl
     while bodies:
         body = bodies.pop()
         order += [name for each in body.findall("joint") if (name := each.get("name", "")) in known]
-        bodies += body.findall("body")[::-1]
+        inside = [[each] if each.tag == "body" else each.findall("body") for each in body]
+        bodies += [each for found in reversed(inside) for each in reversed(found)]
     section = ET.SubElement(root, "keyframe")
     for key in robot.keyframes:
         values: list[float] = []

@@ -677,6 +677,8 @@ PAIRS: tuple[tuple[Format, Format], ...] = (
     ("mjcf", "sdf"),
     ("sdf", "mjcf"),
 )
+CHANGES_OF_JOINTS = ("joint type", "link missing", "link added", "held link missing", "parent exchanged")
+"""Kinds that need a robot whose joints and links nothing else names."""
 SEEN = 1e-10
 """Relative change of torques or joint lines from which a difference is to be found."""
 AMPLIFIED = 1e-2
@@ -704,7 +706,8 @@ def plant_row(seed: int) -> Row:
         if formats == ("mjcf", "mjcf"):
             if any(joint.mimic is not None for joint in robot.joints):
                 continue
-            decorate(robot, rng, floating)
+            if kind not in CHANGES_OF_JOINTS:
+                decorate(robot, rng, floating)
         if fit_formats(robot, set(formats)):
             continue
         if kind == "actuator gear":
@@ -828,7 +831,7 @@ TAGS = {
     "tendon": ("fixed",),
     "equality": ("connect", "weld", "joint", "tendon"),
     "configuration": ("key",),
-    "actuator": ("motor", "position", "velocity"),
+    "actuator": ("motor", "position", "velocity", "general"),
 }
 """Elements of MJCF by the kind of an attribute."""
 

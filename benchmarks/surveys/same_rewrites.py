@@ -163,7 +163,7 @@ def random_robot(rng: np.random.Generator) -> Robot:
     if not any(joint.moves for joint in robot.joints):
         return random_robot(rng)
     if rng.random() < 0.4:
-        held = str(rng.choice(list(robot.links)))
+        held = str(rng.choice([name for name, link in robot.links.items() if not link.is_empty]))
         robot.links["tool"] = Link("tool")
         robot.joints.append(
             Joint("to_tool", "fixed", held, "tool", pose(random_rotation(rng), rng.uniform(-0.2, 0.2, 3)))
@@ -265,11 +265,19 @@ def decorate(robot: Robot, rng: np.random.Generator, floating: bool) -> None:
         actuator.ctrl_range = interval(2.0) if rng.random() < 0.5 else None
         actuator.force_range = interval(20.0) if rng.random() < 0.5 else None
         robot.actuators.append(actuator)
-    touching = [name for name, link in robot.links.items() if any(not each.visual for each in link.shapes)]
+    shapes = {
+        name: [each for each in link.shapes if not each.visual and each.kind != "mesh"]
+        for name, link in robot.links.items()
+    }
+    touching = [name for name, found in shapes.items() if found]
     if len(touching) > 1 and rng.random() < 0.5:
         first, second = (str(name) for name in rng.choice(touching, 2, replace=False))
         if "world" not in (first, second) and second not in robot.body(first):
             robot.exclusions.append((first, second))
+    if len(touching) > 1 and rng.random() < 0.3:
+        first, second = (str(name) for name in rng.choice(touching, 2, replace=False))
+        if second not in robot.body(first):
+            robot.contacts.append((shapes[first][0], shapes[second][0]))
 
 
 def draw_robot(rng: np.random.Generator) -> tuple[str, Robot, str | None, bool]:
@@ -403,6 +411,8 @@ def offset_links(it: Rewritten, rng: np.random.Generator, floating: bool) -> Non
         above = robot.above(name)
         if above is None or above.type == "fixed" or robot.links[name].is_empty or rng.random() < 0.5:
             continue
+        if f"{above.name}_link" in robot.links:
+            continue  # the name that MJCF implies is taken
         p = rng.uniform(-0.2, 0.2, 3)
         offset_link(robot, above, np.zeros(3))
         it.move_frame(name, pose(None, p))
@@ -652,6 +662,9 @@ def draw_style(rng: np.random.Generator) -> Style:
         sites=bool(rng.random() < 0.3),
         free_joint=bool(rng.random() < 0.5),
         quat_scale=float(rng.choice([1.0, -1.0, 0.4, -3.0])),
+        constraint_sites=bool(rng.random() < 0.3),
+        general=bool(rng.random() < 0.3),
+        frames=bool(rng.random() < 0.3),
         includes=bool(rng.random() < 0.25),
     )
 
@@ -660,7 +673,9 @@ def style_words(style: Style) -> list[str]:
     """Return the freedoms that a style uses, in words."""
     words = ["defaults spelled out" if style.spelled else "defaults removed"]
     words += ["order"] * (style.shuffle is not None) + ["degrees"] * style.degree
-    return words + ["includes"] * style.includes
+    for name in ("includes", "general", "frames", "constraint_sites"):
+        words += [name] * getattr(style, name)
+    return words
 
 
 def fit_formats(robot: Robot, formats: set[Format]) -> str:
