@@ -285,9 +285,9 @@ def sources(manifest: Sequence[dict[str, Any]]) -> Iterator[str]:
     yield ""
     repositories = len({each["repo"] for each in manifest})
     yield (
-        f"{len(manifest)} files of {repositories} repositories. Each entry names a repository with its commit "
-        "and, in brackets, the number of files. Part A contains the 178 moved files and four files without "
-        "results. Part B contains six files without results."
+        f"{len(manifest)} files of {repositories} repositories. Each entry names a repository with its "
+        "commit and, in brackets, the number of files. Part A contains the 178 moved files and four files "
+        "without results. Part B contains six files without results."
     )
     yield ""
     yield "<!-- written: sources -->"
