@@ -484,6 +484,8 @@ class Style:
     """A floating base of MJCF by `<joint type="free">`."""
     quat_scale: float = 1.0
     """Factor of quaternions in keyframes of MJCF; none is a difference."""
+    child_class: bool = False
+    """The default class of joints of MJCF is that of the bodies of the robot, not the main one."""
     constraint_sites: bool = False
     """Constraints of MJCF between sites, not links."""
     general: bool = False
@@ -635,6 +637,8 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
     damping, axis = (common[0][0], np.array([0.0, 1.0, 0.0])) if common and style.classes else (0.0, None)
     if axis is not None:
         default = ET.SubElement(root, "default")
+        if style.child_class:
+            default = ET.SubElement(default, "default", {"class": "usual"})
         ET.SubElement(default, "joint", damping=style.number(float(damping)), axis="0 1 0")
         ET.SubElement(
             ET.SubElement(default, "default", {"class": "seen"}),
@@ -835,6 +839,9 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
         for pair in robot.contacts:
             geoms = [contact_names[id(shape)] for shape in pair]
             ET.SubElement(contact, "pair", geom1=geoms[0], geom2=geoms[1])
+    if axis is not None and style.child_class:
+        for body in (*world.findall("body"), *world.findall("frame/body")):
+            body.set("childclass", "usual")
     _write_couplings(root, robot, style)
     _shuffled(style, root)
     _write_keyframes(root, robot, floating, style)
@@ -981,7 +988,8 @@ def _write_keyframes(root: ET.Element, robot: Robot, floating: bool, style: Styl
 
 def split_file(text: str) -> tuple[str, dict[str, str]]:
     """Return MJCF with every second section, and the contents of every second body, in files of their own."""
-    root, parts = ET.fromstring(text), {}
+    root = ET.fromstring(text)
+    parts: dict[str, str] = {}
 
     def move_out(parent: ET.Element, children: list[ET.Element]) -> None:
         name = f"part_{len(parts)}.xml"
@@ -1042,6 +1050,12 @@ def write_sdf(robot: Robot, floating: bool, style: Style | None = None) -> str:
             if not link.is_empty:
                 raise ValueError("a link world with mass or shapes")
             continue
+        if robot.is_implied(name) and robot.children(name)[0].type == "fixed":
+            continue  # the joint has a pose in the link that follows
+        if above is not None and robot.is_implied(above.parent) and above.type == "fixed":
+            between = robot.above(above.parent)
+            assert between is not None
+            above = Joint("", "fixed", between.parent, name, between.T @ above.T)
         if link.is_empty:
             if above is None or above.type != "fixed" or robot.children(name) or above.parent in ("world",):
                 raise ValueError("a link without mass that carries others")
@@ -1088,9 +1102,16 @@ def write_sdf(robot: Robot, floating: bool, style: Style | None = None) -> str:
             continue
         if joint.type not in (*MOVING, "fixed", "ball"):
             raise ValueError("a planar or floating joint")
+        if joint.type == "fixed" and robot.is_implied(joint.parent):
+            continue
         element = ET.SubElement(model, "joint", name=joint.name, type=joint.type)
         ET.SubElement(element, "parent").text = joint.parent
-        ET.SubElement(element, "child").text = joint.child
+        if joint.type != "fixed" and robot.is_implied(joint.child):
+            held = robot.children(joint.child)[0]
+            ET.SubElement(element, "child").text = held.child
+            place(element, inverse(held.T), held.child if style.spelled else "")
+        else:
+            ET.SubElement(element, "child").text = joint.child
         if not joint.moves:
             continue
         axis = ET.SubElement(element, "axis")

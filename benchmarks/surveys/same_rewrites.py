@@ -662,6 +662,7 @@ def draw_style(rng: np.random.Generator) -> Style:
         sites=bool(rng.random() < 0.3),
         free_joint=bool(rng.random() < 0.5),
         quat_scale=float(rng.choice([1.0, -1.0, 0.4, -3.0])),
+        child_class=bool(rng.random() < 0.3),
         constraint_sites=bool(rng.random() < 0.3),
         general=bool(rng.random() < 0.3),
         frames=bool(rng.random() < 0.3),
@@ -673,7 +674,7 @@ def style_words(style: Style) -> list[str]:
     """Return the freedoms that a style uses, in words."""
     words = ["defaults spelled out" if style.spelled else "defaults removed"]
     words += ["order"] * (style.shuffle is not None) + ["degrees"] * style.degree
-    for name in ("includes", "general", "frames", "constraint_sites"):
+    for name in ("includes", "general", "frames", "constraint_sites", "child_class"):
         words += [name] * getattr(style, name)
     return words
 
@@ -704,7 +705,7 @@ def fit_formats(robot: Robot, formats: set[Format]) -> str:
             joint.effort = joint.effort or None
         if "sdf" in formats and joint.moves:
             joint.effort = joint.effort or 1.0
-            joint.velocity = joint.velocity or 1.0
+            joint.velocity = None if "mjcf" in formats else joint.velocity or 1.0
     return ""
 
 
