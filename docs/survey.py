@@ -74,15 +74,21 @@ def page(entries: Sequence[Entry]) -> str:
         "",
         "Written by `python -m docs.survey`. Each engine loads every file by the call that users of the "
         "engine make, with a fixed and with a floating base. dynx compares the results with reference values "
-        "([doctor](doctor.md)). A file *differs* if an engine refuses it, cannot be used for it, or has "
-        "a result that differs from the reference values by more than 1e-12. A file is *refused* if dynx "
-        "cannot read it. The tables list only proved causes, each with the number "
-        "of its places in the file, and with the engines that it affects. The effect of a cause is the "
-        "change of an engine's result when dynx removes only this cause, relative to the largest reference "
-        "value. If several places or engines have the cause, the table has the largest effect. `no answer` "
-        "means that the engine refuses the file, or cannot compute the quantity, until the cause is removed. "
-        "`present` means that the cause changes contact forces, for which the table has no number. "
-        "[Rules](rules.md) explains the causes.",
+        "([doctor](doctor.md)), and finds the causes of differences. [Rules](rules.md) explains the causes.",
+        "",
+        "- A file *differs* if an engine refuses it, cannot be used for it, or has a wrong result. A result is "
+        "wrong if it differs from the reference values by more than 1e-12.",
+        "- A file is *refused* if dynx cannot read it.",
+        "",
+        "The tables list only proved causes. The columns are:",
+        "",
+        "- *places*: the number of places in the file that have the cause.",
+        "- *effect*: the change of an engine's result when dynx removes only this cause, relative to the "
+        "largest reference value. If the cause has several places or affects several engines, this is the "
+        "largest effect. `no answer` means that the engine refuses the file, or cannot compute the quantity, "
+        "until the cause is removed. `present` means that the cause changes contact forces. For these the "
+        "table has no number.",
+        "- *engines*: the engines that the cause affects.",
         "",
         "[Public files](public_files.md) has figures on files on which the doctor was not developed.",
         "",
@@ -101,8 +107,8 @@ def page(entries: Sequence[Entry]) -> str:
         left = [f"- {label(entry)}, {entry['base']}: {line}" for entry in of for line in exceptions(entry)]
         if left:
             unread = (
-                "Files that dynx refused, and engines that were not used for a file, or do not load it even "
-                "after dynx's repair:"
+                "The next list has files that dynx refused, and engines without results for a file. Such an "
+                "engine was not used, or does not load the file even after dynx's repair:"
             )
             lines += ["", unread, "", *left]
         lines.append("")
