@@ -76,8 +76,8 @@ def page(entries: Sequence[Entry]) -> str:
         "engine make, with a fixed and with a floating base. dynx compares the results with reference values "
         "([doctor](doctor.md)), and finds the causes of differences. [Rules](rules.md) explains the causes.",
         "",
-        "- A file *differs* if an engine refuses it, cannot be used for it, or has a wrong result. A result is "
-        "wrong if it differs from the reference values by more than 1e-12.",
+        "- A file *differs* if an engine refuses it, cannot be used for it, or has a wrong result. A result "
+        "is wrong if it differs from the reference values by more than 1e-12.",
         "- A file is *refused* if dynx cannot read it.",
         "",
         "The tables list only proved causes. The columns are:",

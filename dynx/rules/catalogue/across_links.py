@@ -31,25 +31,29 @@ door that weighs a kilogram is not reported."""
 class RobotInMillimetres(Rule):
     """DX520 robot-in-millimetres: The lengths of the robot are in millimetres, where URDF requires metres.
 
-    The rule uses the distance of each moving joint from the frame of its parent link, if this distance is not
-    zero. It reports a robot if there are at least two such distances, their median is 5 m or more, and the
-    robot has less than 1e-3 kg per cube of their sum. (Air has 1.2 kg per cubic metre.) If the robot has no
-    mass, the median must be 20 m or more. In example-robot-data and pybullet_data the largest median is 1.2
-    m, and the least mass per cube is 0.017 kg/m^3.
+    A *joint distance* is the distance of a moving joint from the frame of its parent link, if it is not zero.
+    The rule reports a robot under three conditions:
 
-    A wheel, a gripper or a turntable may have fewer than two such distances. The rule then uses three kinds
-    of length: this distance, the distances of centres of mass from their joints, and the diagonals of the
-    shapes of its bodies, including meshes. It reports the robot if there are at least two lengths, the median
-    of each kind is 5 m or more, and the robot has less than 1e-5 kg per cube of the sum of all lengths. If
-    the robot has no mass, the shapes must be 20 m or more. So this rule does not report a robot in which only
-    a mesh lacks its scale (DX517 does).
+    - The robot has at least two joint distances.
+    - Their median is 5 m or more (20 m or more if the robot has no mass).
+    - The mass of the robot, divided by the cube of their sum, is below 1e-3 kg/m^3. (Air has 1.2 kg/m^3.)
+
+    In example-robot-data and pybullet_data the largest median is 1.2 m, and the least mass per cube is 0.017
+    kg/m^3.
+
+    A wheel, a gripper or a turntable may have fewer than two joint distances. The rule then uses three kinds
+    of length: joint distances, distances of centres of mass from their joints, and diagonals of the shapes of
+    bodies, including meshes. It reports the robot if there are at least two lengths, the median of each kind
+    is 5 m or more, and the robot is light for its size. *Light* means a mass below 1e-5 kg/m^3 times the cube
+    of the sum of all lengths. If the robot has no mass, the shapes must be 20 m or more. So this rule does
+    not report a robot in which only a mesh lacks its scale (DX517 does).
 
     Usual causes: a program exported the unit of the drawing, or someone copied lengths from a data sheet.
 
     All engines use the numbers unchanged, and agree. Poses and gravity torques are a thousand times too
     large, and inertias about the joints are a million times too large.
 
-    The file does not say whether tensors, meshes and ranges of sliding joints are in millimetres, too, so no
+    The file does not say whether tensors, meshes and ranges of sliding joints are also in millimetres, so no
     edit removes the cause.
     """
 
@@ -141,12 +145,13 @@ class InertiaScaledUp(Rule):
     shapes.
 
     Simulations with a fixed time step are more stable with larger inertias. So some authors multiply the
-    tensors of light links by 10 or 100, or reduce masses without changing the tensors. The rule finds this in
-    links with a box or a cylinder. It divides the three principal moments of the link by those of the solid
-    shape with uniform density and the link's mass. It reports the link if the three ratios are equal to 2 %,
-    are 1.5 or more, and another link with a different shape has the same ratio. A shape that is drawn too
-    small, or a hollow part, has three different ratios. Spheres and cubes are left out, because their ratios
-    are always equal. The rule reports nothing in example-robot-data and pybullet_data.
+    tensors of light links by 10 or 100, or reduce masses without changing the tensors. The rule finds such
+    tensors of links with a box or a cylinder. It divides the three principal moments of the link by those of
+    the solid shape with uniform density and the link's mass. It reports the link under three conditions: the
+    three ratios are equal (to 2 %), they are 1.5 or more, and another link with a different shape has the
+    same ratio. A shape that is drawn too small, or a hollow part, has three different ratios. The rule leaves
+    out spheres and cubes, because their ratios are always equal. The rule reports nothing in
+    example-robot-data and pybullet_data.
 
     All engines use the numbers unchanged. Accelerations and frequencies are lower than those of the real
     robot, and gains that were tuned with this model are too large.

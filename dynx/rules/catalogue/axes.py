@@ -40,13 +40,12 @@ class AxisNotUnit(EditingRule):
 
     URDF says that ``<axis xyz="..."/>`` should have length 1. A wrong length does not change the direction,
     and most readers normalise the axis. Examples are ``0 0 -2``, ``1 1 0``, and
-    ``0.577350 0.577350 0.577350``, which was rounded to six digits, so that its length is off by 1e-6.
+    ``0.577350 0.577350 0.577350``. The last axis was rounded to six digits, so its length is off by 1e-6.
 
     - PyBullet 3.2.7 keeps the length. A prismatic joint then moves by length times its coordinate, so the
       positions of all links beyond it are wrong. The simulation (``stepSimulation``) uses the axis with this
-      length for every type of joint, so accelerations are wrong, too. ``calculateInverseDynamics``,
+      length for every type of joint, so accelerations are also wrong. But ``calculateInverseDynamics``,
       ``calculateMassMatrix`` and ``calculateJacobian`` scale the axis to length 1, with a warning on stdout.
-      So PyBullet contradicts itself.
     - Pinocchio 4.1, MuJoCo 4.0, Drake 1.51 and dynx scale the axis to length 1.
     - MuJoCo and Drake read an axis shorter than about 1e-6 as zero, and refuse the file.
 
@@ -81,15 +80,15 @@ class AxisWithoutDirection(EditingRule):
     """DX202 axis-without-direction: The axis of a joint that moves is zero or empty.
 
     ``<axis xyz="0 0 0"/>`` and ``<axis/>`` define no direction of motion. Exporters write the first form for
-    fixed joints, where readers ignore it. If someone changes the type to ``revolute``, the axis matters. A
-    joint without any ``<axis>`` is fine: all engines use URDF's default (1, 0, 0). A direction in another
-    attribute than ``xyz`` is DX218.
+    fixed joints, whose axes most readers ignore. If someone changes the type to ``revolute``, the axis
+    matters. A joint without any ``<axis>`` is fine: all engines use URDF's default (1, 0, 0). If another
+    attribute than ``xyz`` has the direction, see DX218.
 
-    - Pinocchio 4.1 loads it. The joint has a coordinate that moves nothing: its row and column of the mass
-      matrix are zero, and forward dynamics gives NaN.
-    - PyBullet 3.2.7 loads it. With the zero axis, positions beyond the joint are NaN, and inverse dynamics
-      and mass matrix fail. For ``<axis/>`` PyBullet reads uninitialised memory, so the axis is random. The
-      doctor then does not use PyBullet, and reports say "not used".
+    - Pinocchio 4.1 loads the file. The joint has a coordinate that moves nothing: its row and column of the
+      mass matrix are zero, and forward dynamics gives NaN.
+    - PyBullet 3.2.7 loads the file. With the zero axis, positions beyond the joint are NaN, and inverse
+      dynamics and mass matrix fail. For ``<axis/>`` PyBullet reads uninitialised memory, so the axis is
+      random. The doctor then does not use PyBullet, and reports say "not used".
     - MuJoCo 4.0 refuses the file.
     - Drake 1.51 refuses the zero axis, and reads ``<axis/>`` as (1, 0, 0).
 
@@ -152,7 +151,7 @@ class AxisAttributeMisspelled(EditingRule):
       and column of the mass matrix are zero.
     - PyBullet 3.2.7 loads the file, but reads the axis from uninitialised memory, so the axis is random. The
       doctor then does not use PyBullet, and reports say "not used".
-    - MuJoCo 4.0 refuses the file ("required attribute missing: 'xyz'"), also where the joint is fixed.
+    - MuJoCo 4.0 refuses the file ("required attribute missing: 'xyz'"), even if the joint is fixed.
     - Drake 1.51 reads (1, 0, 0), URDF's default for a joint without ``<axis>``.
 
     Of the four engines, only MuJoCo reads the axis of a fixed joint. dynx refuses such an axis of a joint
@@ -227,18 +226,18 @@ class AxisNearlyAligned(EditingRule):
     engines drop this.
 
     CAD programs export axes with noise, such as ``0 1 1.2e-12`` or ``1.6e-10 0 1``. Some engines have faster
-    code for axes along x, y and z, and use it if the axis is within a tolerance of such a coordinate axis.
+    code for axes along x, y and z. They use it if an axis is almost a coordinate axis, within a tolerance.
 
     - Drake 1.51.1 uses the coordinate axis if a component of the unit axis rounds to more than 1 - 2.2e-16.
       The deviation is then below about 1.8e-8 rad. This applies to revolute, continuous and prismatic joints.
     - Pinocchio 4.1.0 uses the coordinate axis up to a deviation of 1e-12.
-    - Both do this only for positive directions: they use the axis ``1.6e-10 0 -1`` as it is.
+    - Both engines do this only for positive directions. For example, they keep the axis ``1.6e-10 0 -1``.
     - PyBullet 3.2.7, MuJoCo 4.0.0 and dynx use all numbers.
 
     The effect: poses and torques are off by up to twice the deviation [rad] at every such joint.
 
-    What to do: write the coordinate axis, which is what the author intended. ``dynx doctor --fix`` writes it,
-    and the report says that the physics changed, by less than 2e-8. ``--choose DX226=keep`` leaves the axis.
+    What to do: write the coordinate axis, which the author intended. ``dynx doctor --fix`` writes it, and the
+    report says that the physics changed by less than 2e-8. ``--choose DX226=keep`` leaves the axis.
     """
 
     engines = measured_on("pinocchio", "drake")

@@ -46,7 +46,7 @@ class RepeatedElement(EditingRule):
     - Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 use the first element and ignore the others without a
       warning. dynx does the same, with a note.
 
-    The engines that read the file agree. But if you edit the second element, this has no effect.
+    The engines that read the file agree. But an edit of the second element has no effect.
 
     What to do: find out which element is right, and remove the other. ``dynx doctor --fix`` keeps the first
     element, which the engines use.
@@ -87,13 +87,12 @@ class LineTooLong(EditingRule):
     PyBullet reads ``value="2<line break>.5"`` instead of ``value="2.5"``, and the mass is 2, without a
     warning. If the line break is inside the name of an attribute or element, PyBullet refuses the file.
 
-    Programs that save white space write such files: minified XML, or the output of serialisers that do not
-    indent.
+    Some programs write the whole file as one line, to save white space, or because they do not indent.
 
     Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 read lines of any length.
 
-    The effect depends on the position of the line break, so any edit of the file may change it. It may be a
-    mass without its decimals, an offset of zero, or nothing.
+    The effect depends on the position of the line break, so any edit of the file may change the effect. The
+    result may be a mass without its decimals, an offset of zero, or no error.
 
     What to do: write one element per line. ``dynx doctor --fix`` inserts a line break before each element of
     such lines, and changes nothing else.
@@ -170,8 +169,8 @@ class UnknownUrdfVersion(EditingRule):
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore it.
 
     What to do: remove the attribute, or write ``version="1.0"``. ``dynx doctor --fix`` removes the attribute,
-    which means version 1.0. There is one exception: if the version is above 1.2 and an origin has a
-    quaternion, which needs URDF 1.1, it writes ``version="1.2"``.
+    which means version 1.0. There is one exception: an origin with a quaternion needs URDF 1.1. If the file
+    has such an origin and the version is above 1.2, ``dynx doctor --fix`` writes ``version="1.2"``.
     """
 
     stage = "reading"
@@ -201,15 +200,16 @@ class LoneCarriageReturn(Rule):
 
     Programs end a line with a line feed (Linux, macOS), or with a carriage return and a line feed (Windows).
     A carriage return alone ended lines on the Macintosh until 2001. Today it comes from conversions of line
-    ends and from pasted text. It may be in a whole file, or in a single place that no editor shows.
+    ends and from pasted text. It may end every line of a file, or occur at a single place that no editor
+    shows.
 
-    - PyBullet 3.2.7 reads up to the next line feed, at most 8191 bytes, and drops the text after the first
-      carriage return. If the rest is not well-formed XML, or lacks a required element, it refuses the file
-      ("Cannot load URDF file"). If whole elements are lost, such as an ``<axis>`` or an ``<origin>``, it
-      loads another robot without a warning.
+    - PyBullet 3.2.7 reads up to the next line feed, at most 8191 bytes. Of this text it drops everything
+      after the first carriage return. If the remaining text is not well-formed XML, or lacks a required
+      element, PyBullet refuses the file ("Cannot load URDF file"). If only whole elements are lost, such as
+      an ``<axis>`` or an ``<origin>``, PyBullet loads another robot without a warning.
     - Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 read a carriage return as the end of a line, as XML defines it.
-      But their error messages count line feeds only: if the file has no line feed, every fault is in line 1.
-      Reports of dynx count both.
+      But their error messages count only line feeds. If the file has no line feed, every fault is in line 1.
+      Reports of dynx count both kinds of line ends.
 
     If there are only blanks between the carriage return and the line feed, there is no effect, and dynx does
     not report it.
@@ -246,7 +246,7 @@ class ProcessingInstruction(EditingRule):
     All four engines parse URDF with tinyxml2, which accepts such text only at the beginning of the file.
 
     - Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 refuse the file. They accept an instruction
-      only if nothing but declarations and other instructions precedes it.
+      only at the beginning of the file, where declarations and other instructions may precede it.
     - dynx ignores the instruction, as XML defines it.
 
     What to do: remove the instruction, as ``dynx doctor --fix`` does. No engine uses its content.
@@ -297,8 +297,8 @@ class TextNotUtf8(Rule):
     """DX440 text-not-utf8: The file is not in UTF-8, but engines read every file as UTF-8.
 
     Engines read every file as UTF-8, and ignore the encoding that the file declares. In a file in Latin-1 or
-    a similar encoding, characters beyond ASCII are then invalid. In comments this has no effect. In names of
-    links and joints:
+    a similar encoding, characters beyond ASCII are then invalid. Such characters have no effect in comments.
+    In names of links and joints they cause errors:
 
     - Pinocchio 4.1 and MuJoCo 4.0 load the file, but raise UnicodeDecodeError when a program reads such a
       name.
@@ -307,8 +307,8 @@ class TextNotUtf8(Rule):
 
     All four engines refuse a file in UTF-16 or UTF-32.
 
-    dynx reads such files in the declared encoding. If the file declares none and is not UTF-8, dynx reads it
-    as Latin-1.
+    dynx reads such files in the declared encoding. If a file declares no encoding and is not in UTF-8, dynx
+    reads it as Latin-1.
 
     What to do: save the file in UTF-8. ``dynx doctor --fix`` writes UTF-8, and corrects the declaration.
     """
@@ -351,8 +351,8 @@ class MisspelledWord(Rule):
 
     URDF readers ignore unknown names, mostly without a warning. With ``<intertial>`` the link has no mass,
     with ``<limit uper="1">`` the range ends at 0, and with ``<dynamics dampng="1">`` there is no damping. The
-    rule reports an unknown name if it is similar to a known name that is missing, or has the letters of this
-    name in another order (``ryp``). It examines elements of ``<robot>``, ``<link>``, ``<joint>`` and
+    rule reports an unknown name if a known name is missing and the two are similar, or have the same letters
+    in another order (``ryp``). It examines elements of ``<robot>``, ``<link>``, ``<joint>`` and
     ``<inertial>``, and attributes that affect the dynamics. In an ``<origin>`` it also reports ``roll``,
     ``pitch`` and ``yaw`` in place of ``rpy``, and ``x``, ``y`` and ``z`` in place of ``xyz``. Extensions
     (``<gazebo>``, ``<sensor>``, names with a prefix) are not similar to known names.
@@ -408,10 +408,10 @@ class LeftOverXacro(EditingRule):
     """DX531 left-over-xacro: The file has xacro elements, which every engine ignores with their contents.
 
     The program ``xacro`` evaluates elements such as ``<xacro:property>``, ``<xacro:include>`` and calls of
-    macros. They remain in a file that was expanded by hand, or renamed from ``.xacro`` to ``.urdf``.
-    Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore these elements without a warning, and dynx
-    ignores them with a note. The engines agree, but the robot lacks the links, joints and inertias that a
-    macro would write.
+    macros. These elements remain in a file if someone expanded it by hand, or renamed it from ``.xacro`` to
+    ``.urdf``. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore these elements without a
+    warning, and dynx ignores them with a note. The engines agree, but the robot lacks the links, joints and
+    inertias that a macro would write.
 
     For expressions such as ``${mass}`` in a number, see DX420 and DX429.
 
@@ -458,8 +458,9 @@ class MalformedXml(Rule):
     All four engines parse URDF with tinyxml2, which accepts some faults: ``--`` in a comment, ``&`` or ``<``
     in a name, attributes without white space between them, and a blank after ``<``. It also accepts
     ``<!mesh ...>`` in place of a comment, a malformed or second XML declaration, text before ``<robot>`` and
-    elements after it. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file without a
-    warning, and read the same robot. Python's XML parsers, xacro and the launch system of ROS refuse it.
+    elements after ``</robot>``. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file
+    without a warning, and read the same robot. Python's XML parsers, xacro and the launch system of ROS
+    refuse it.
 
     dynx reads the file as the engines do, with a note. tinyxml2 and dynx refuse other faults: an attribute
     that occurs twice or has no quotes, and an element that does not end. dynx names the line.

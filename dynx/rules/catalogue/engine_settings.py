@@ -26,13 +26,13 @@ class InertiaScaledForContact(EditingRule):
     ``<contact><inertia_scaling value="3.0"/></contact>`` is an extension of PyBullet, which makes contacts of
     light links more stable. Many files that come with PyBullet, and files copied from them, have it.
 
-    - PyBullet 3.2.7 multiplies the moments of inertia of the link by the value, also with
-      ``URDF_USE_INERTIA_FROM_FILE``, and also in ``calculateInverseDynamics`` and ``calculateMassMatrix``.
-      The mass does not change.
+    - PyBullet 3.2.7 multiplies the moments of inertia of the link by the value, but not the mass. It does so
+      even with ``URDF_USE_INERTIA_FROM_FILE``, and even in ``calculateInverseDynamics`` and
+      ``calculateMassMatrix``.
     - Pinocchio 4.1, MuJoCo 4.0, Drake 1.51 and dynx ignore the element.
 
-    The effect is that of a wrong tensor: a few per cent of the mass matrix at a scale of 3, and more for
-    light links.
+    The effect is that of a wrong tensor. With a value of 3, the mass matrix is off by a few per cent, and by
+    more for light links.
 
     What to do: remove the element if the dynamics matters. ``dynx doctor --fix`` removes it, and leaves the
     rest of ``<contact>`` in place.
@@ -62,9 +62,9 @@ class InertiaFromShapes(CallingRule):
 
     Measured with PyBullet 3.2.7:
 
-    - The centre of the cuboid is the centre of mass in the file, wherever the shapes are. Several shapes give
-      one box. A mesh counts as the bounding box of its vertices, in the axes of the mesh. PyBullet adds
-      margins of 1 to 3 mm on each side.
+    - The centre of the cuboid is the centre of mass in the file, wherever the shapes are. All shapes of a
+      link together give one cuboid. A mesh counts as the bounding box of its vertices, in the axes of the
+      mesh. PyBullet adds margins of 1 to 3 mm on each side.
     - A link without collision shapes has the inertia of a cuboid of 2 mm, almost zero. A link without
       ``<inertial>`` has a mass of 1 kg and the inertia of its shapes. PyBullet reads no shape from an STL
       file in text form.
@@ -73,13 +73,13 @@ class InertiaFromShapes(CallingRule):
       do.
 
     PyBullet loads 65 robots of example-robot-data that have joints. With the plain call, inverse dynamics of
-    64 of them is off by more than 1e-6 of the largest torque, and the median is 0.8 %. On UR5 the error is up
-    to 2.8 N m.
+    64 of these robots is off by more than 1e-6 of the largest torque. The median of the error is 0.8 %. On
+    UR5 the error is up to 2.8 N m.
 
     What to do: write ``p.loadURDF(path, useFixedBase=True, flags=p.URDF_USE_INERTIA_FROM_FILE)``.
 
-    The file is correct, and no change of the file corrects the call. ``dynx doctor`` examines the plain call
-    beside the engines, as the variant ``pybullet:plain``. Its difference counts only if ``--engine`` names
+    The file is correct, and no change of the file corrects the call. ``dynx doctor`` also examines the plain
+    call, as the variant ``pybullet:plain``. It counts a difference of the variant only if ``--engine`` names
     the variant.
     """
 
@@ -111,15 +111,15 @@ class InertiaFromShapes(CallingRule):
 class LinksMergedWrongly(CallingRule):
     """DX116 links-merged-wrongly: PyBullet's flag URDF_MERGE_FIXED_LINKS adds inertias in wrong frames.
 
-    With ``flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_MERGE_FIXED_LINKS``, ``p.loadURDF`` merges links that
-    fixed joints connect into one body. The simulation is then faster.
+    With ``flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_MERGE_FIXED_LINKS``, ``p.loadURDF`` merges rigidly
+    connected links into one body. The simulation is then faster.
 
-    - PyBullet 3.2.7 ignores the rotation of the fixed joint, the rotations of both inertial frames, and the
-      centre of mass of the parent. The mass of the merged body is right.
+    - When PyBullet 3.2.7 merges two links, it ignores the rotation of the fixed joint, the rotations of both
+      inertial frames, and the centre of mass of the parent. The mass of the merged body is right.
     - Pinocchio 4.1, MuJoCo 4.0 (``fusestatic``) and Drake 1.51 merge links correctly.
 
-    On more than 40 of 65 robots of example-robot-data the mass matrix is off by 0.2 to 54 %. For a robot
-    without such links, such as UR5, the flag changes nothing.
+    On more than 40 of 65 robots of example-robot-data the mass matrix is off by 0.2 to 54 %. For other
+    robots, such as UR5, the flag changes no result.
 
     What to do: leave the flag out, or merge the links in the file.
 
@@ -163,7 +163,7 @@ class MujocoSettings(EditingRule):
     of its ``<compiler>`` change the robot. ``boundmass`` and ``boundinertia`` raise small masses and moments.
     ``settotalmass`` scales all masses. ``balanceinertia`` and ``inertiafromgeom`` replace tensors. With
     ``autolimits="false"`` MuJoCo refuses the limits of a URDF. In ``<option>`` the attributes ``density``,
-    ``viscosity`` and ``wind`` add the drag of a fluid, and ``<flag>`` switches gravity or constraints off.
+    ``viscosity`` and ``wind`` add the drag of a fluid. ``<flag>`` can switch gravity or constraints off.
 
     - MuJoCo 4.0 applies these settings.
     - Pinocchio 4.1, PyBullet 3.2.7, Drake 1.51 and dynx ignore ``<mujoco>``.

@@ -54,12 +54,12 @@ class InertiaBrokenByRounding(Rule):
     binary digit decides whether an engine accepts the moments, and engines round differently. For example,
     0.3 does not exceed 0.1 + 0.2 in doubles, but 0.13 exceeds 0.1 + 0.03 by 3e-17.
 
-    - PyBullet 3.2.7 tests the moments to the last bit after its own diagonalisation. If the test fails, it
-      prints "Bad inertia tensor properties" and sets the whole tensor to zero. Its inverse dynamics tests the
-      moments again, about the origin of the link. If this test fails, it refuses the whole robot: inverse
-      dynamics, mass matrix and Jacobian fail.
-    - MuJoCo 4.0.0 refuses the file ("inertia must satisfy A + B >= C"), in about two of five cases where the
-      rpy of the inertial rotates a plate.
+    - PyBullet 3.2.7 tests the moments to the last bit after its own diagonalisation. If the moments fail this
+      test, PyBullet prints "Bad inertia tensor properties" and sets the whole tensor to zero. Inverse
+      dynamics of PyBullet tests the moments again, about the origin of the link. If the moments fail this
+      second test, inverse dynamics, mass matrix and Jacobian of the whole robot fail.
+    - MuJoCo 4.0.0 may refuse the file ("inertia must satisfy A + B >= C"). If the rpy of the inertial rotates
+      a plate, this happens in about two of five cases.
     - Pinocchio 4.1.0 has no such test. Drake 1.51.1 has a tolerance of 1e-14.
 
     The effect: if PyBullet sets the tensor to zero, its mass matrix is off by 1e-6 to 0.9 of its size.
@@ -67,8 +67,8 @@ class InertiaBrokenByRounding(Rule):
     What to do: the tensor is correct. Raise the moments by less than anyone can measure.
 
     ``dynx doctor --fix`` adds the same amount to all three moments: 16 units in the last place of the largest
-    moment about the link's origin. If the link is a point mass on a fixed joint, it merges this link with the
-    link that carries it. The equations of motion change by a few 1e-15 of their size.
+    moment about the link's origin. If the link is a point mass on a fixed joint, ``dynx doctor --fix`` merges
+    it with its parent link. The equations of motion change by a few 1e-15 of their size.
     """
 
     engines = measured_on("pybullet", "mujoco")
@@ -118,25 +118,25 @@ class InertiaOfNoBody(ImpossibleInertia):
     can have.
 
     Each principal moment of a body is an integral over its mass, such as the integral of x^2 + y^2. So no
-    principal moment can exceed the sum of the other two. A tensor that violates this by more than rounding
-    was mistyped, written in mixed units, or computed about several points. Sometimes all six numbers are the
-    placeholder 1e-6.
+    principal moment can exceed the sum of the other two. If a tensor violates this by more than rounding,
+    there was a mistake: the tensor was mistyped, written in mixed units, or computed about several points.
+    Sometimes all six numbers are the placeholder 1e-6.
 
     - PyBullet 3.2.7 prints "Bad inertia tensor properties" and sets the whole tensor to zero.
-    - MuJoCo 4.0.0 refuses the file ("inertia must satisfy A + B >= C"), also if the link cannot move.
+    - MuJoCo 4.0.0 refuses the file ("inertia must satisfy A + B >= C"), even if the link cannot move.
     - Drake 1.51.1 prints a warning, and replaces the tensor by that of a ball of water of the same mass.
     - Pinocchio 4.1.0 uses the numbers unchanged, as dynx does.
 
     So three engines load three different robots, and MuJoCo loads none. On public robots the mass matrix is
     off by 6e-6 (a finger) to 4 % (a sensor mount), and the accelerations are off by up to 40 %.
 
-    What to do: find the true tensor. No engine can be right with this tensor.
+    What to do: find the true tensor. With the tensor of the file, the results of every engine are wrong.
 
     ``dynx doctor --fix`` first adds the inertias of the links that are rigidly connected to this link. If a
     body can have this sum, it merges the inertias into one link, which changes no equation of motion.
     Otherwise it writes the nearest tensor that a body can have, and the report says that the physics changed.
-    ``--choose DX103=nearest`` never merges links. With ``--choose DX103=keep`` the numbers stay, and the
-    report prints code that gives them to PyBullet and Drake after loading. MuJoCo cannot use these numbers.
+    ``--choose DX103=nearest`` never merges links. With ``--choose DX103=keep`` the file keeps the tensor, and
+    the report prints code that sets it in PyBullet and Drake after loading. MuJoCo cannot use such a tensor.
     """
 
     fault = "triangle"
@@ -148,25 +148,25 @@ class NegativePrincipalMoment(ImpossibleInertia):
 
     A moment of inertia is a sum of masses times squared distances, so it cannot be negative. A negative
     principal moment mostly comes from one of two mistakes. Either the parallel axis theorem was applied in
-    the wrong direction or twice, or the products of inertia are too large for the moments. Reasons for the
-    latter are a misplaced decimal point, mixed units, or two exchanged numbers. The three numbers on the
-    diagonal may look correct.
+    the wrong direction or twice. Or the products of inertia are too large for the moments, because of a
+    misplaced decimal point, mixed units, or two exchanged numbers. The three numbers on the diagonal may look
+    correct.
 
     - PyBullet 3.2.7 prints "Bad inertia tensor properties" and sets the whole tensor to zero.
-    - MuJoCo 4.0.0 refuses the file ("inertia must have positive eigenvalues"), also if the link cannot move.
+    - MuJoCo 4.0.0 refuses the file ("inertia must have positive eigenvalues"), even if the link cannot move.
     - Drake 1.51.1 prints a warning, and replaces the tensor by that of a ball of water of the same mass.
     - Pinocchio 4.1.0 uses the numbers unchanged, as dynx does. The mass matrix may then have a negative
       eigenvalue, and a simulation gains energy without a source.
 
-    What to do: find the true tensor. No engine can be right with this tensor.
+    What to do: find the true tensor. With the tensor of the file, the results of every engine are wrong.
 
     ``dynx doctor --fix`` first adds the inertias of the links that are rigidly connected to this link. If a
     body can have this sum, it merges the inertias into one link, which changes no equation of motion.
     Otherwise it writes the nearest tensor that a body can have, and the report says that the physics changed.
-    ``--choose DX104=nearest`` never merges links. With ``--choose DX104=keep`` the numbers stay, and the
-    report prints code that gives them to PyBullet and Drake after loading. If PyBullet's inverse dynamics
-    refuses them even so, the doctor extrapolates its results from those of two robots that it accepts. MuJoCo
-    cannot use these numbers.
+    ``--choose DX104=nearest`` never merges links. With ``--choose DX104=keep`` the file keeps the tensor, and
+    the report prints code that sets it in PyBullet and Drake after loading. If PyBullet's inverse dynamics
+    still refuses the tensor, the doctor extrapolates the results from those of two robots that PyBullet
+    accepts. MuJoCo cannot use such a tensor.
     """
 
     fault = "negative"
@@ -182,18 +182,18 @@ class InertiaNotDiagonal(Rule):
 
     PyBullet stores principal moments only. If ``ixy``, ``ixz`` or ``iyz`` is not zero, its loader
     diagonalises the tensor by Jacobi's method. When the products of inertia are below a millionth of the
-    trace, it makes one more rotation, and drops the remaining products.
+    trace, the loader makes one last rotation, and drops the remaining products.
 
-    - PyBullet 3.2.7: its tensor is off by 1e-14 to 1e-9 of its size, and by up to 2e-6 where principal
-      moments are nearly equal.
+    - The tensor in PyBullet 3.2.7 is off by 1e-14 to 1e-9 of its size. If principal moments are nearly equal,
+      it is off by up to 2e-6.
     - Pinocchio 4.1.0, MuJoCo 4.0.0 and Drake 1.51.1 are right to rounding.
 
     The effect: mass matrix and inverse dynamics are off by 1e-13 to 1e-9 of their size, and accelerations by
     up to 1e-8. This is too small to see in a simulation. But if you compare two engines to rounding, this
-    difference hides smaller ones. 46 of the 69 robots of example-robot-data have this difference.
+    difference hides smaller differences. 46 of the 69 robots of example-robot-data have this difference.
 
-    What to do: nothing, if a millionth is good enough. To make engines agree to rounding, write the principal
-    moments, and rotate the inertial frame.
+    What to do: if an accuracy of a millionth is good enough, do nothing. To make engines agree to rounding,
+    write the principal moments, and rotate the inertial frame.
 
     ``dynx doctor --fix`` writes the moments about the principal axes, zero products of inertia, and the axes
     as the ``rpy`` of the inertial's origin. It calculates them in extended precision, and writes all digits
@@ -240,9 +240,9 @@ class RootInertialRotated(Rule):
     for those of the world.
 
     The ``<inertial>`` of the root link has an ``rpy`` that is not zero. With a fixed base the mass of the
-    root does not matter to the motion, so this should have no effect.
+    root does not affect the motion, so the ``rpy`` should have no effect.
 
-    - PyBullet 3.2.7 calculates inverse dynamics and Jacobians in the axes of this inertial frame: the
+    - PyBullet 3.2.7 calculates inverse dynamics and Jacobians in the axes of this inertial frame. So the
       direction of gravity and the rows of the Jacobian are rotated. The kinematics and the mass matrix are
       right, so the error is hard to find.
     - Pinocchio 4.1.0, MuJoCo 4.0.0 and Drake 1.51.1 are not affected.
@@ -291,12 +291,12 @@ class InertiaTooSmall(Rule):
 
     - MuJoCo 4.0.0 refuses a file in which a principal moment is below 1e-14 kg m^2 ("inertia must have
       positive eigenvalues"), unless the whole tensor is zero. Examples are a thin rod with a moment of 0
-      about its axis, and tensors of rounding residues such as -1e-20. It also refuses a point mass on a joint
-      ("mass and inertia of moving bodies must be larger than mjMINVAL"). It merges rigidly connected links
-      one after another, and refuses the file if a sum on the way is a point or a rod. It checks links that
-      cannot move, too.
-    - PyBullet 3.2.7 replaces a tensor with a negative residue by zero, which has no effect on the results.
-      Its simulation does not move a joint if the inertia about the joint axis is below 2.2e-16 kg m^2.
+      about its axis, and tensors of rounding residues such as -1e-20. MuJoCo also refuses a point mass on a
+      joint ("mass and inertia of moving bodies must be larger than mjMINVAL"). MuJoCo merges rigidly
+      connected links one after another. It refuses the file if one of the sums is a point or a rod. MuJoCo
+      also checks links that cannot move.
+    - PyBullet 3.2.7 replaces a tensor with a negative residue by zero, which has no effect on the results. If
+      the inertia about a joint axis is below 2.2e-16 kg m^2, PyBullet's simulation does not move the joint.
     - Pinocchio 4.1.0 and Drake 1.51.1 use the numbers unchanged.
 
     The effect: the file does not load in MuJoCo.
@@ -305,9 +305,9 @@ class InertiaTooSmall(Rule):
     results. For a robot of micrometres, change the unit of length or mass.
 
     ``dynx doctor --fix`` merges such a link with the links rigidly connected to it, which changes no equation
-    of motion. If this is not enough, it raises the moments to 1.5e-14 kg m^2. If this number is more than a
-    rounding error of the robot's largest inertia, the report says that the physics changed. If it is more
-    than a thousandth of the largest inertia, the file stays as it is.
+    of motion. If this is not enough, it raises the moments to 1.5e-14 kg m^2. In a very small robot this
+    number is more than a rounding error of the largest inertia. The report then says that the physics
+    changed. If 1.5e-14 kg m^2 is more than a thousandth of the largest inertia, the file stays as it is.
     """
 
     engines = measured_on("mujoco")
@@ -474,27 +474,27 @@ class TinyInertialOffset(Rule):
 
     MuJoCo stores the inertia of a body about its principal axes, the largest moment first. It also stores the
     pose of these axes in the body frame: the centre of mass and the rotation. When MuJoCo compiles a model,
-    it marks a body whose inertial frame nearly coincides with the body frame (``body_sameframe``), and then
-    does not use the stored pose.
+    it marks each body whose inertial frame nearly coincides with the body frame (``body_sameframe``). For a
+    marked body it does not use the stored pose.
 
     - MuJoCo 4.0.0 drops the rotation if it is smaller than about 2e-6 rad (each component of the vector part
-      of its quaternion is below 1e-6). It then also drops the centre of mass, if each coordinate is below
-      1e-6 m. MuJoCo merges rigidly connected links first, so these numbers are those of the merged body,
-      unless the file has ``<mujoco><compiler fusestatic="false"/></mujoco>``.
+      of its quaternion is below 1e-6). If also each coordinate of the centre of mass is below 1e-6 m, MuJoCo
+      drops the centre of mass. MuJoCo first merges rigidly connected links, so these bounds apply to the
+      merged body. With ``<mujoco><compiler fusestatic="false"/></mujoco>`` they apply to each link.
     - Pinocchio 4.1.0, PyBullet 3.2.7 and Drake 1.51.1 use all numbers.
 
-    The effect: in a robot whose links are all balanced, a centre of mass at 7e-7 m caused 2.3e-2 of the
-    torques, which MuJoCo drops. In a robot with other links it is 1e-7 of the torques or less. A dropped
-    rotation changes the mass matrix by 1e-6 of the difference between the moments.
+    The effect: a dropped centre of mass changes torques by 1e-7 of their size or less. But in a robot whose
+    links are all balanced, a centre of mass at 7e-7 m caused 2.3e-2 of the torques. A dropped rotation
+    changes the mass matrix by 1e-6 of the difference between the moments.
 
     What to do: usually the offset is noise of a CAD program. Then write zero. If the number is intended,
     clear the marks after loading:
-    ``model.body_sameframe[:] = model.body_simple[:] = model.dof_simplenum[:] = 0``. No text of an
-    ``<inertial>`` avoids them, because MuJoCo orders the axes itself.
+    ``model.body_sameframe[:] = model.body_simple[:] = model.dof_simplenum[:] = 0``. No other text of the
+    ``<inertial>`` avoids the marks, because MuJoCo orders the axes itself.
 
-    By default dynx prints this line, and proves the cause by it. ``--choose DX117=zero`` writes zero into the
-    file instead, for all engines. The report then says that the physics changed. If a robot with a floating
-    base has no moving joint, the line has no effect, and dynx writes zero.
+    By default dynx prints this line of code, and uses it to prove the cause. ``--choose DX117=zero`` writes
+    zero into the file instead, for all engines. The report then says that the physics changed. If a robot
+    with a floating base has no moving joint, the line of code has no effect, and dynx writes zero.
     """
 
     engines = measured_on("mujoco")
@@ -588,11 +588,11 @@ class InertiaRoundedUnsymmetrically(Rule):
 
     Before the first call of ``calculateInverseDynamics``, ``calculateMassMatrix`` or ``calculateJacobian``,
     PyBullet 3.2.7 computes the tensor of each link about the link's origin, and checks that it is symmetric.
-    It computes two opposite entries as ``(m x) y`` and ``(m y) x``, whose rounding errors differ. It compares
-    their difference with a fixed bound of 1.1e-15 kg m^2 (five units in the last place of 1), whatever the
-    size of the link. Here m is the mass, and x and y are two coordinates of the centre of mass along the
-    principal axes. A link can fail if m x y is above 2 kg m^2. In a test with centres of mass within half a
-    metre, a quarter of the links failed at 100 kg, and four of five at 100 t.
+    It computes two opposite entries as ``(m x) y`` and ``(m y) x``, whose rounding errors differ. Here m is
+    the mass, and x and y are two coordinates of the centre of mass along the principal axes. PyBullet
+    compares the difference of the two entries with a fixed bound of 1.1e-15 kg m^2 (five units in the last
+    place of 1), whatever the size of the link. So a link can fail if m x y is above 2 kg m^2. In a test with
+    centres of mass within half a metre, a quarter of the links failed at 100 kg, and four of five at 100 t.
 
     - PyBullet 3.2.7 prints "invalid inertia tensor for body 3 I(2,0)!=I(0,2)", and all three calls raise an
       exception for this robot. PyBullet also checks links that cannot move, but never the root. Poses and the

@@ -37,10 +37,10 @@ class DampingInInverseDynamics(CallingRule):
     ``<dynamics damping="0.5"/>`` is a torque against the velocity of a joint. In some engines inverse
     dynamics includes this torque:
 
-    - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``): not included.
-    - MuJoCo 4.0 (``mj_inverse``) and Drake 1.51 (``CalcInverseDynamics`` with the plant's force elements):
-      included, also from MJCF and SDF. PyBullet (``loadMJCF``) drops the damping in MJCF.
-    - Forward dynamics: included in PyBullet's ``stepSimulation``, MuJoCo and Drake, and not included in
+    - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) do not include damping.
+    - MuJoCo 4.0 (``mj_inverse``) and Drake 1.51 (``CalcInverseDynamics`` with the plant's force elements)
+      include damping. This also holds for MJCF and SDF. PyBullet (``loadMJCF``) drops the damping in MJCF.
+    - Forward dynamics includes damping in PyBullet's ``stepSimulation``, in MuJoCo and in Drake, but not in
       Pinocchio's ``aba``.
 
     The effect is damping times velocity, often a few per cent of the torque. If the inertia is small, it is
@@ -74,11 +74,11 @@ class FrictionInInverseDynamics(CallingRule):
 
     ``<dynamics friction="0.2"/>`` is a constant torque against the motion of a joint.
 
-    - MuJoCo 4.0 reads it as ``frictionloss``, a constraint. ``mj_inverse`` adds the force of this constraint:
-      the friction times the sign of the velocity. At low speed it adds less, because a smaller force can hold
-      the joint.
+    - MuJoCo 4.0 reads the friction as ``frictionloss``, a constraint. ``mj_inverse`` adds the force of this
+      constraint: the friction times the sign of the velocity. At low speed the force is smaller, because a
+      smaller force can hold the joint.
     - Pinocchio 4.1 stores the friction, but does not use it. PyBullet 3.2.7 does not use it in inverse
-      dynamics. Drake 1.51 prints a warning that it does not support it.
+      dynamics. Drake 1.51 prints a warning that it does not support friction.
 
     The effect is as large as the friction: a few per cent of the torque for an arm with gears.
 
@@ -140,15 +140,15 @@ class MimicAsConstraint(CallingRule):
 
     ``<mimic joint="a" multiplier="2" offset="0.1"/>`` means that the joint is always at 2 a + 0.1.
 
-    - Pinocchio 4.1 and PyBullet 3.2.7 ignore ``<mimic>``, and the joint moves freely. With
-      ``buildModelFromUrdf(..., mimic=True)``, the joint has no coordinate in Pinocchio.
+    - Pinocchio 4.1 and PyBullet 3.2.7 ignore ``<mimic>``, and the joint moves freely. In Pinocchio,
+      ``buildModelFromUrdf(..., mimic=True)`` makes a joint without a coordinate.
     - MuJoCo 4.0 adds a soft equality constraint, and the joint has a coordinate. If the state violates the
       constraint, ``mj_inverse`` adds the force of the constraint, which can be a hundred times the torque.
-    - Drake 1.51 adds a constraint, which discrete-time simulation keeps. Its inverse dynamics ignores the
-      constraint, and its continuous-time forward dynamics raises an error.
+    - Drake 1.51 adds a constraint. Discrete-time simulation satisfies the constraint, inverse dynamics
+      ignores it, and continuous-time forward dynamics raises an error.
 
-    None of these is wrong, but they are different robots. In dynx a mimic joint has no coordinate, and its
-    torque acts on the joint that it follows, on every backend.
+    No engine is wrong, but the engines load different robots. In dynx a mimic joint has no coordinate, and
+    its torque acts on the joint that it follows, on every backend.
 
     What to do: find out how your engine reads mimic joints. The doctor compares all engines with free mimic
     joints, and prints the calls that switch the constraints off. The file is correct, so
@@ -185,7 +185,7 @@ class EmptyDynamics(EditingRule):
     URDF both ``damping`` and ``friction`` are optional.
 
     - Pinocchio 4.1 and PyBullet 3.2.7 refuse the file ("joint dynamics element specified with no damping and
-      no friction"), for every type of joint, also fixed joints.
+      no friction"), for every type of joint, even fixed joints.
     - MuJoCo 4.0 and Drake 1.51 read the file.
 
     What to do: write ``damping="0"``, or remove the element. ``dynx doctor --fix`` corrects a misspelled
@@ -213,16 +213,18 @@ class LimitsAsForces(CallingRule):
     ``<limit lower="-2" upper="2"/>`` defines the range of a joint. URDF does not define what happens beyond
     this range. A joint with two equal limits is beyond its range at every other position.
 
-    - Pinocchio 4.1 and Drake 1.51: no effect. Inverse and forward dynamics have no limits (Drake's discrete
-      simulation does).
-    - MuJoCo 4.0: a constraint force pushes a joint beyond its limit back, and ``mj_inverse`` adds this force
-      to the torque. The force can be a hundred times the torque. MuJoCo ignores equal limits, with a warning.
-    - PyBullet 3.2.7: ``stepSimulation`` pushes a joint beyond its limit back, also if the limits are equal.
-      ``calculateInverseDynamics`` ignores limits. PyBullet ignores a limit of ``lower="0"`` without ``upper``
-      (see DX216 for other limits without ``upper``).
+    - Pinocchio 4.1 and Drake 1.51 ignore limits in inverse and forward dynamics. Only Drake's discrete
+      simulation has limits.
+    - In MuJoCo 4.0 a constraint force pushes back a joint that is beyond its limit. ``mj_inverse`` adds this
+      force to the torque. The force can be a hundred times the torque. MuJoCo ignores equal limits, with a
+      warning.
+    - In PyBullet 3.2.7 ``stepSimulation`` pushes back a joint that is beyond its limit, even if the limits
+      are equal. ``calculateInverseDynamics`` ignores limits. PyBullet ignores a limit of ``lower="0"``
+      without ``upper`` (see DX216 for other limits without ``upper``).
 
-    The doctor compares engines at positions within the limits, where all engines agree. It compares a joint
-    with equal limits at any position, because the equations of motion have no limits.
+    The doctor compares engines at positions within the limits, where all engines agree. A joint with equal
+    limits has no such range. The doctor compares it at any position, because the equations of motion have no
+    limits.
 
     What to do: write the range of the joint, or ``type="fixed"`` (see DX508). The file does not say which of
     the two is right, so ``dynx doctor --fix`` does not change it. The doctor prints the calls that switch
@@ -251,14 +253,15 @@ _ROTOR_TAG = "drake:rotor_inertia"
 class RotorInertia(CallingRule):
     """DX307 rotor-inertia: An actuator has a rotor inertia, which only Drake adds to its joint.
 
-    ``<drake:rotor_inertia value="0.001"/>`` and ``<drake:gear_ratio value="10"/>`` in the ``<actuator>`` of a
-    ``<transmission>`` are an extension of Drake. A rotor behind a gear of ratio n adds n^2 times its own
-    inertia to the joint. This is the reflected inertia, or armature.
+    In the ``<actuator>`` of a ``<transmission>``, Drake reads two elements of its own:
+    ``<drake:rotor_inertia value="0.001"/>`` and ``<drake:gear_ratio value="10"/>``. A rotor behind a gear of
+    ratio n adds n^2 times its own inertia to the joint. This is the reflected inertia, or armature.
 
     - Drake 1.51 adds the armature to the diagonal of the mass matrix and to inverse dynamics.
     - Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and dynx ignore these elements in URDF.
 
-    The effect is as large as the armature: in an arm with gears, often as large as the inertia of the links.
+    The effect is as large as the armature. In an arm with gears it is often as large as the inertia of the
+    links.
 
     What to do: decide whether your robot model includes the rotors. For the armature, Pinocchio has
     ``model.armature``, MuJoCo has ``dof_armature``, and dynx reads ``<dynamics armature="...">``. The file is
@@ -290,14 +293,14 @@ class ContactsAsForces(CallingRule):
     if their shapes touch or overlap. Shapes often overlap because they are larger than the links.
 
     - MuJoCo 4.0: ``mj_inverse`` finds the contacts of the configuration, and adds their forces to the torque.
-      It leaves out contacts between a link and its parent, but not contacts between other links. If shapes
-      overlap, the error of the torque can have any size.
+      It leaves out only contacts between a link and its parent. If shapes overlap, the error of the torque
+      can have any size.
     - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) have no contacts. PyBullet
       simulates contacts of a robot with itself only with a flag. Drake 1.51 has contacts if a scene graph is
       connected, but not in inverse dynamics.
 
-    The doctor searches for states within the limits, with mimic joints that follow, at which links touch. The
-    report names these links.
+    The doctor searches for states at which links touch. In these states all joints are within their limits,
+    and mimic joints follow their leading joints. The report names the links that touch.
 
     What to do: find out whether your torques include contacts. The file is correct, so ``dynx doctor --fix``
     does not change it. The doctor compares without contacts, and prints the call that switches them off in

@@ -34,11 +34,11 @@ class JointWithoutLimit(EditingRule):
 
     A misspelled element, such as ``<Limit>``, has the same effect, because readers ignore it.
 
-    What to do: write the limits of the joint. ``dynx doctor --fix`` corrects a misspelled element. Without
-    such an element the file contains no limits, and ``dynx doctor --fix`` leaves the joint unlimited: a
-    revolute joint becomes ``continuous``, and a prismatic joint gets the largest double for its limits.
-    ``--choose DX203=zero`` writes ``lower="0" upper="0"`` instead, which are URDF's defaults in a
-    ``<limit>``. Simulations with limits then hold the joint at 0.
+    What to do: write the limits of the joint. ``dynx doctor --fix`` corrects a misspelled element. If there
+    is no such element, ``dynx doctor --fix`` leaves the joint unlimited: a revolute joint becomes
+    ``continuous``, and a prismatic joint gets the largest double for its limits. ``--choose DX203=zero``
+    writes ``lower="0" upper="0"`` instead. These numbers are URDF's defaults in a ``<limit>``. Simulations
+    with limits then hold the joint at 0.
     """
 
     stage = "reading"
@@ -82,15 +82,15 @@ class LimitWithoutEffortOrVelocity(EditingRule):
     Up to version 1.1, URDF requires the attributes ``effort`` and ``velocity``. They do not affect the
     equations of motion.
 
-    - Pinocchio 4.1 refuses the file ("limit has no effort"), for every type of joint, also fixed joints. If
-      the robot states ``version="1.2"``, Pinocchio reads it (see DX222).
+    - Pinocchio 4.1 refuses the file ("limit has no effort"), for every type of joint, even fixed joints. If
+      the robot states ``version="1.2"``, Pinocchio reads the file (see DX222).
     - PyBullet 3.2.7, MuJoCo 4.0, Drake 1.51 and dynx read the file. In dynx a missing limit means unlimited.
 
     Files with such limits are common, because only urdfdom, the reader of Pinocchio and ROS, checks them.
 
     What to do: write both attributes. ``dynx doctor --fix`` corrects a misspelled name, such as
-    ``velocty="2"``. For a missing attribute it writes the largest double, which every engine reads and which
-    dynx reads as "no limit".
+    ``velocty="2"``. For a missing attribute it writes the largest double. Every engine reads this number, and
+    dynx reads it as "no limit".
     """
 
     stage = "reading"
@@ -114,8 +114,8 @@ class LowerLimitAboveUpper(EditingRule):
 
     Usually the two limits were exchanged, or the sign of one was lost.
 
-    - Drake 1.51 refuses the file, with a message that shows a failed condition in Drake's C++ sources. It
-      also refuses such limits of a continuous joint, where limits have no meaning.
+    - Drake 1.51 refuses the file. Its message shows a failed condition in Drake's C++ sources. Drake also
+      refuses such limits of a continuous joint, although they have no meaning there.
     - MuJoCo 4.0 and PyBullet 3.2.7 treat the joint as unlimited.
     - Pinocchio 4.1 stores the limits unchanged, so random configurations and clamping are wrong.
 
@@ -152,12 +152,12 @@ class LowerLimitAboveUpper(EditingRule):
 class NegativeEffortOrVelocity(EditingRule):
     """DX206 negative-effort-or-velocity: The largest effort or speed of a joint is negative.
 
-    Other formats use ``-1`` for "no limit". Otherwise the sign is a mistake.
+    Some authors write ``-1`` for "no limit", as in other formats. Any other negative number is a mistake.
 
     - Pinocchio 4.1 refuses the file: "Some components of min_effort are greater than max_effort".
-    - Drake 1.51 refuses a negative velocity, with a failed condition in its C++ sources. It refuses a
-      negative effort only if a ``<transmission>`` gives the joint an actuator ("which has a negative effort
-      limit"). Otherwise it ignores the effort.
+    - Drake 1.51 refuses a negative velocity. Its message shows a failed condition in its C++ sources. Drake
+      refuses a negative effort only if a ``<transmission>`` gives the joint an actuator ("which has a
+      negative effort limit"). Otherwise it ignores the effort.
     - PyBullet 3.2.7 reads both limits unchanged. MuJoCo 4.0 does not read the velocity, and drops the sign of
       the effort.
 
@@ -203,7 +203,7 @@ class SafetyControllerWithoutGain(EditingRule):
 
     What to do: if one of your programs reads the element, complete it; otherwise remove it.
     ``dynx doctor --fix`` corrects a misspelled name, such as ``k_velocty="20"``. Otherwise it adds
-    ``k_velocity="0"``, with which the safety controller has no effect.
+    ``k_velocity="0"``. The safety controller then has no effect.
     """
 
     stage = "reading"
@@ -231,21 +231,21 @@ class UpperLimitMissing(EditingRule):
     is rarely intended.
 
     - PyBullet 3.2.7 reads a missing ``upper`` as -1, so the range is -2 to -1. A joint between -1 and 0 is
-      outside this range. In ``stepSimulation`` the joint can then move towards -1 but not away from it, as at
-      a stop. ``calculateInverseDynamics`` ignores limits.
-    - Pinocchio 4.1 and dynx (with a note) have the range -2 to 0.
-    - Drake 1.51 has a lower limit of -2 and no upper limit. MuJoCo 4.0 ignores a ``<limit>`` with only one of
-      the two.
+      outside this range. In ``stepSimulation`` such a joint can move towards -1, but not away from -1.
+      ``calculateInverseDynamics`` ignores limits.
+    - Pinocchio 4.1 and dynx (with a note) read the range -2 to 0.
+    - Drake 1.51 reads a lower limit of -2 and no upper limit. MuJoCo 4.0 ignores a ``<limit>`` that has only
+      ``lower`` or only ``upper``.
 
-    Only PyBullet's range affects a motion that the file allows. If ``lower`` is above -1, it is above
-    PyBullet's ``upper``, and PyBullet ignores both limits. A missing ``lower`` is 0 in PyBullet and in
-    Pinocchio, and no limit in Drake and MuJoCo.
+    Only PyBullet's reading hinders a motion that the file allows. If ``lower`` is above -1, it is above
+    PyBullet's ``upper``. Then PyBullet ignores both limits. A missing ``lower`` is 0 in PyBullet and
+    Pinocchio, and "no limit" in Drake and MuJoCo.
 
     The effect: in PyBullet's simulation, a joint between -1 and 0 does not accelerate.
 
     What to do: write the intended limit. ``dynx doctor --fix`` corrects a misspelled name, such as
     ``uper="1"``. Otherwise it writes ``upper="0"``, as URDF, Pinocchio and dynx read it. The other three
-    engines then have this range, too.
+    engines then read the same range.
     """
 
     advice = "Write lower and upper of every range."
@@ -300,8 +300,8 @@ class LimitIncompleteInUrdf12(EditingRule):
 class EffortLimitZero(Rule):
     """DX506 effort-limit-zero: The effort limit of a joint is zero, so its motor can apply no force.
 
-    Authors mostly write ``effort="0"`` because URDF requires the attribute. But it means that the motor can
-    apply no force.
+    Authors mostly write ``effort="0"`` because URDF requires the attribute. But the number means that the
+    motor can apply no force.
 
     Pinocchio and PyBullet store the zero. A program that saturates torques at this limit gets zero torque.
     Gazebo and ros_control apply no force to such a joint. MuJoCo reads 0 as "no limit" (no ``actfrcrange``).
@@ -327,8 +327,8 @@ class EffortLimitZero(Rule):
 class VelocityLimitZero(Rule):
     """DX507 velocity-limit-zero: The velocity limit of a joint is zero, so it must not move.
 
-    Authors mostly write ``velocity="0"`` because URDF requires the attribute. But it means that the joint
-    must not move.
+    Authors mostly write ``velocity="0"`` because URDF requires the attribute. But the number means that the
+    joint must not move.
 
     Planners that time a path (MoveIt, TOPP-RA, Ruckig) divide by the limit, or report that there is no
     trajectory. Pinocchio and Drake store the zero. PyBullet stores it as ``maxVelocity`` and does not apply
@@ -355,10 +355,12 @@ class RangeOfZeroWidth(Rule):
     In URDF the default of ``lower`` and ``upper`` is 0. So a ``<limit>`` without them has the range 0 to 0:
     the joint has a coordinate, but cannot move.
 
-    Engines differ. If both attributes are absent, Pinocchio has the range 0 to 0. In PyBullet, MuJoCo and
-    Drake the joint has no limits and moves freely. If two equal numbers are written, Pinocchio and Drake keep
-    them as limits. PyBullet's ``stepSimulation`` holds the joint there. MuJoCo prints a warning and ignores
-    them. The equations of motion are the same in all engines.
+    The equations of motion are the same in all engines. But engines read the limits differently:
+
+    - Both attributes are absent: Pinocchio reads the range 0 to 0. In PyBullet, MuJoCo and Drake the joint
+      has no limits and moves freely.
+    - Both attributes have the same number: Pinocchio and Drake keep the limits. PyBullet's ``stepSimulation``
+      holds the joint at this number. MuJoCo prints a warning and ignores the limits.
 
     The file does not say whether the author meant ``fixed``, ``continuous`` or a range, so no edit removes
     the cause.
@@ -388,8 +390,8 @@ class LimitsOnContinuousJoint(EditingRule):
 
     A joint with ``type="continuous"`` rotates without limit, so ``lower`` and ``upper`` have no meaning.
     Pinocchio and MuJoCo ignore them. PyBullet reports them in ``getJointInfo`` and does not apply them. In
-    Drake 1.51 they are the limits of the joint. The equations of motion are the same in all engines, but a
-    person who reads the file may think that the joint has this range.
+    Drake 1.51 they are the limits of the joint. The equations of motion are the same in all engines. But a
+    reader of the file may think that the joint has this range.
 
     What to do: if the joint has a range, write ``type="revolute"``. Otherwise remove the two attributes, so
     that the joint is unlimited in every engine. By default ``dynx doctor --fix`` leaves them. With
@@ -419,8 +421,8 @@ class ZeroOutsideLimits(Rule):
 
     Nearly every tool starts at zero: PyBullet after loadURDF, RViz, MuJoCo's ``qpos0``,
     ``pinocchio.neutral``, and Drake's default context. If zero is outside the range of a joint, a simulation
-    begins with a force that pushes the joint back. Planners refuse such a start state. A check of
-    self-collision at the zero configuration checks a configuration that the robot cannot reach.
+    begins with a force that pushes the joint back. Planners refuse such a start state. The robot cannot reach
+    the zero configuration, so a check for self-collisions in this configuration has no use.
 
     Such a range is valid, and right for an elbow that cannot be stretched. So the doctor reports it and does
     not correct it. Another zero of the joint would change the numbers in every program that uses the robot.

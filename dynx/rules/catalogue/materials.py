@@ -84,11 +84,11 @@ class MaterialWithoutColour(EditingRule):
     A ``<material>`` directly in ``<robot>`` defines a colour for ``<visual>`` elements. The dynamics does not
     depend on it. But some engines refuse the file:
 
-    - Drake 1.51 refuses the file for a material without name ("missing a required name"), and for one without
-      colour and texture ("has no color or texture information"). It also refuses an ``rgba`` that is not four
+    - Drake 1.51 refuses a material without name ("missing a required name"), and a material without colour
+      and texture ("has no color or texture information"). It also refuses an ``rgba`` that is not four
       numbers.
-    - MuJoCo 4.0 refuses a ``<color>`` whose ``rgba`` is missing or not four numbers, also in ``<visual>``. It
-      accepts a material without colour or name.
+    - MuJoCo 4.0 refuses a ``<color>`` whose ``rgba`` is missing or not four numbers, even in a ``<visual>``.
+      It accepts a material without colour or name.
     - Pinocchio 4.1 and PyBullet 3.2.7 accept all of these.
 
     What to do: write the name and the colour. ``dynx doctor --fix`` writes grey in place of a missing or

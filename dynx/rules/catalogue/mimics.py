@@ -26,8 +26,8 @@ from dynx.rules.numbers_in_text import decimal
 class MimicOfNothing(EditingRule):
     """DX208 mimic-of-nothing: A mimic joint names no joint that it can follow.
 
-    There are four cases: ``<mimic>`` names no joint, a missing joint, or its own joint; or it belongs to a
-    fixed joint.
+    There are four cases: ``<mimic>`` names no joint, ``<mimic>`` names a joint that the file does not have,
+    ``<mimic>`` names its own joint, or ``<mimic>`` belongs to a fixed joint.
 
     - Drake 1.51 refuses the file in all four cases, and names the line.
     - Pinocchio 4.1 and MuJoCo 4.0 refuse a ``<mimic>`` without the attribute ``joint``. MuJoCo also refuses a
@@ -38,7 +38,7 @@ class MimicOfNothing(EditingRule):
     In dynx, a joint that follows a missing joint moves freely. dynx refuses a joint that follows itself.
 
     What to do: name the joint to follow, or remove ``<mimic>``. ``dynx doctor --fix`` corrects a misspelled
-    attribute, such as ``<mimic jiont="finger"/>``. Otherwise it removes ``<mimic>``, so that the joint moves
+    attribute, such as ``<mimic jiont="finger"/>``. Otherwise it removes ``<mimic>``. The joint then moves
     freely, as in the engines that load the file.
     """
 
@@ -86,9 +86,9 @@ def _why_nothing(case: Case, joint: SourceElement, mimic: SourceElement) -> str 
 class MimicOfFixedJoint(EditingRule):
     """DX209 mimic-of-fixed-joint: A mimic joint follows a joint that cannot move.
 
-    Usually someone made the leading joint fixed, for example in a gripper that is not used, and forgot the
-    followers. By the definition of ``<mimic>``, a follower of a fixed joint cannot move: its position is the
-    offset.
+    Usually someone made the leading joint fixed, for example in a gripper that is not used, and forgot its
+    mimic joints. A mimic joint that follows a fixed joint cannot move: by the definition of ``<mimic>``, its
+    position is the offset.
 
     - Drake 1.51 refuses the file: a joint with one coordinate cannot mimic a joint without coordinates.
     - MuJoCo 4.0 prints a warning, and the joint moves freely.
@@ -141,12 +141,16 @@ class MimicOfFixedJoint(EditingRule):
 class MimicChain(EditingRule):
     """DX511 mimic-chain: A mimic joint follows a joint that is itself a mimic joint.
 
-    A *follower* is a mimic joint. ``<mimic>`` should name a joint that moves by itself. If it names another
-    follower, dynx and joint_state_publisher multiply the factors along the chain, as the definition of
-    ``<mimic>`` says. Pinocchio 4.1 with ``mimic=True`` refuses such a file ("Mimicking and mimicked
-    configuration spaces have different sizes"). By default all these joints are free in Pinocchio, and in
-    PyBullet, too. MuJoCo adds an equality constraint for each follower, which its solver satisfies only
-    approximately.
+    A *follower* is a mimic joint. ``<mimic>`` should name a joint that moves by itself. Here it names another
+    follower:
+
+    - dynx and joint_state_publisher multiply the factors along the chain, as the definition of ``<mimic>``
+      says.
+    - Pinocchio 4.1 with ``mimic=True`` refuses the file ("Mimicking and mimicked configuration spaces have
+      different sizes"). By default all these joints are free in Pinocchio.
+    - In PyBullet all these joints are free.
+    - MuJoCo adds an equality constraint for each follower. Its solver satisfies the constraint only
+      approximately.
 
     What to do: let each follower name the first joint of its chain, with the product of the multipliers and
     the combined offset. The position is m2 (m1 x + b1) + b2 = (m2 m1) x + (m2 b1 + b2), so the robot is the
@@ -189,13 +193,13 @@ class MimicBeyondLimits(Rule):
     """DX512 mimic-beyond-limits: A mimic joint leaves its limits although the joint that it follows is within
     its limits.
 
-    The multiplier and the offset map the range of the leading joint to a range of the follower. This range is
-    larger than the follower's own ``<limit>``. So one of these numbers is wrong: a limit, the multiplier or
-    the offset.
+    The multiplier and the offset map the range of the leading joint to a range of the mimic joint. This range
+    is larger than the mimic joint's own ``<limit>``. So one of these numbers is wrong: a limit, the
+    multiplier or the offset.
 
-    In some engines the limits and the coupling are constraints (MuJoCo, Drake in discrete time). In these
-    engines the follower's limit stops the leading joint before its own limit. The equations of motion are the
-    same in all engines.
+    In MuJoCo, and in Drake's discrete-time simulation, the limits and the coupling are constraints. In these
+    engines the limit of the mimic joint stops the leading joint before its own limit. The equations of motion
+    are the same in all engines.
 
     The file does not say which number is wrong, so no edit removes the cause.
     """

@@ -60,14 +60,14 @@ class LinkWithoutInertial(Rule):
     A link that only marks a place, such as a tool flange or a camera frame, is often written without an
     ``<inertial>`` element. URDF does not define the mass of such a link.
 
-    - Pinocchio 4.1.0 and Drake 1.51.1: no mass, as in dynx.
-    - PyBullet 3.2.7: 1 kg, with 1 kg m^2 about every axis, unless the link is named exactly ``world``. It
-      prints "No inertial data for link, using mass=1" among other output.
-    - MuJoCo 4.0.0: the mass of the primitive collision shapes of the link at 1000 kg/m^3; without such shapes
-      no mass.
+    - Pinocchio 4.1.0, Drake 1.51.1 and dynx give the link no mass.
+    - PyBullet 3.2.7 gives it 1 kg, with 1 kg m^2 about every axis, unless the link is named exactly
+      ``world``. PyBullet prints "No inertial data for link, using mass=1" among other output.
+    - MuJoCo 4.0.0 gives it the mass of its primitive collision shapes at 1000 kg/m^3. Without such shapes the
+      link has no mass.
 
     The effect is large: torques, mass matrices and accelerations are off by 10 % to many times their size if
-    the link moves. With a floating base, the root link moves, too. With a fixed base, the root link and the
+    the link moves. With a floating base, the root link also moves. With a fixed base, the root link and the
     links rigidly connected to it cannot move. Their mass has no effect, so the report does not list them.
 
     What to do: write the mass and the inertia of the link. If the link is only a frame, write zeros.
@@ -120,7 +120,7 @@ class MasslessRoot(Rule):
     In many robots the root link is empty, such as ``base_link``, and a fixed joint connects it to the body of
     the robot. With a fixed base this is harmless. With a floating base, the root moves:
 
-    - PyBullet 3.2.7 reads mass 0 as "fixed to the world", also with ``useFixedBase=False``: the robot hangs
+    - PyBullet 3.2.7 reads mass 0 as "fixed to the world", even with ``useFixedBase=False``. The robot hangs
       in the air, and its base has no coordinates.
     - MuJoCo 4.0.0 merges the root with the links that are rigidly connected to it, so it is not affected. If
       there are no such links, it refuses the file ("mass and inertia of moving bodies must be larger than
@@ -285,9 +285,9 @@ class MasslessMovingLink(Rule):
 class MassMatrixSingular(Rule):
     """DX113 mass-matrix-singular: Nothing beyond a joint has mass, so the mass matrix is singular.
 
-    In some files the last links of a chain have no inertia, such as fingers, wheels and rotating sensors. No
-    torque is needed to move them, so their acceleration is undefined: the mass matrix is singular, and
-    forward dynamics has no unique solution.
+    In some files the last links of a chain have no inertia. Examples are fingers, wheels and rotating
+    sensors. To move them needs no torque, so their acceleration is undefined: the mass matrix is singular,
+    and forward dynamics has no unique solution.
 
     - Pinocchio 4.1.0 returns NaN for all joints.
     - PyBullet 3.2.7 returns an acceleration of zero for such a joint, and the right acceleration for all
@@ -343,17 +343,17 @@ class NoInertialData(Rule):
     - PyBullet 3.2.7 gives 1 kg and 1 kg m^2 about every axis to each link without ``<inertial>``. If the root
       has an ``<inertial>`` of zero, PyBullet fixes a floating robot to the world.
     - MuJoCo 4.0.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL"), unless
-      collision shapes other than meshes give the links a mass.
+      the links have collision shapes other than meshes. From these MuJoCo computes a mass.
 
     The effect: torques, mass matrices and accelerations of this robot have no meaning in any engine. The
     doctor compares only poses and Jacobians.
 
     What to do: enter the masses and inertias, from the data sheet or the CAD model.
 
-    ``dynx doctor --fix`` does not invent inertias. The report does not call the engines alike.
-    ``--choose DX118=least`` gives every moving body 2e-15 kg and 1.5e-14 kg m^2, with which all engines load
-    the file. Do not simulate the result: a torque of 1e-6 N m accelerates a joint to millions of rad/s. If
-    only some moving links have no mass, see DX110 and DX113.
+    ``dynx doctor --fix`` does not invent inertias. So the report does not say that the engines agree.
+    ``--choose DX118=least`` gives every moving body 2e-15 kg and 1.5e-14 kg m^2. All engines then load the
+    file. Do not simulate the result: a torque of 1e-6 N m accelerates a joint to millions of rad/s. If only
+    some moving links have no mass, see DX110 and DX113.
     """
 
     engines = measured_on("pybullet", "mujoco")
@@ -480,9 +480,8 @@ class IncompleteInertial(EditingRule):
     - Pinocchio 4.1 prints a line on stderr. Without a mass it drops the whole inertial, so the link has no
       mass. Without a tensor the link is a point mass.
     - PyBullet 3.2.7 and MuJoCo 4.0 refuse the file.
-    - Drake 1.51 reads missing parts as zero: a link with a mass and no tensor is a point mass. An
-      ``<inertial>`` with a tensor and no mass is physically impossible; Drake prints a warning and replaces
-      it.
+    - Drake 1.51 reads missing parts as zero. So a link with a mass and no tensor is a point mass. An
+      ``<inertial>`` with a tensor and no mass is physically impossible. Drake replaces it, with a warning.
 
     The effect is a file that does not load, or a link without its mass. The relative error of the mass matrix
     is then of order 0.01 to 1.
@@ -491,7 +490,7 @@ class IncompleteInertial(EditingRule):
     ``<mass valeu="1.5"/>`` or ``ixxx="0.02"``. In other cases it guesses, and the report says so. It reads
     the number in ``<mass>2.5</mass>`` as the mass. It drops a tensor without mass, so the link has no mass. A
     mass without tensor becomes a point mass at the origin of the inertial, as in Pinocchio and Drake.
-    ``--choose DX410=weightless`` drops this mass, too.
+    ``--choose DX410=weightless`` also drops this mass.
     """
 
     stage = "reading"

@@ -15,13 +15,14 @@ class ArmatureInMassMatrix(CallingRule):
     """DX309 armature-in-mass-matrix: A joint has an armature, which some engines add to the mass matrix and
     others leave out.
 
-    ``<joint armature="0.01"/>`` in MJCF is the armature: the inertia of a rotor as it acts at the joint. In
-    SDF it follows from ``<drake:rotor_inertia>`` and ``<drake:gear_ratio>``.
+    The armature is the inertia of a rotor as it acts at the joint. MJCF states it as
+    ``<joint armature="0.01"/>``. In SDF it follows from ``<drake:rotor_inertia>`` and ``<drake:gear_ratio>``.
 
     - MuJoCo 4.0 adds the armature to the diagonal of the mass matrix, and to inverse and forward dynamics.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) keeps it in ``model.armature``; ``crba``, ``rnea`` and ``aba``
-      add it, too.
-    - Drake 1.51 adds it if the joint has an actuator (``<motor joint="..."/>``), and otherwise drops it.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) stores the armature in ``model.armature``. ``crba``, ``rnea`` and
+      ``aba`` also add it.
+    - Drake 1.51 adds the armature if the joint has an actuator (``<motor joint="..."/>``). Otherwise Drake
+      drops it.
     - PyBullet 3.2.7 (``loadMJCF``) drops it.
 
     The effect is as large as the armature. In an arm with gears it is often as large as the inertia of the
@@ -88,7 +89,8 @@ class SpringInInverseDynamics(CallingRule):
 class GravityCompensation(CallingRule):
     """DX311 gravity-compensation: Only MuJoCo compensates the weight of a body.
 
-    ``<body gravcomp="1"/>`` is a force that cancels the weight of the body (``0.5`` cancels half of it).
+    ``<body gravcomp="1"/>`` adds a force that cancels the weight of the body. (``gravcomp="0.5"`` cancels
+    half of the weight.)
 
     - MuJoCo 4.0 applies this force in ``mj_inverse`` and in ``mj_forward``.
     - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) drop it without a
@@ -125,8 +127,8 @@ class TendonForces(CallingRule):
     geoms. The stiffness, damping, dry friction, armature and limits of a tendon cause forces at the joints.
 
     - MuJoCo 4.0 includes these forces in ``mj_inverse`` and ``mj_forward``.
-    - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) drop tendons, Drake
-      with a warning.
+    - Pinocchio 4.1 (``buildModelFromMJCF``), Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) drop tendons. Only
+      Drake prints a warning.
 
     The effect is the force of the tendon. If tendons close the fingers of a hand, the fingers close only in
     MuJoCo.
@@ -155,17 +157,17 @@ class TendonForces(CallingRule):
 class ActuatorForces(CallingRule):
     """DX313 actuator-forces: Actuators act on the joints without a command, but only in MuJoCo.
 
-    ``<position joint="elbow" kp="100"/>`` holds the joint at the command. Without a command, it holds the
-    joint at 0, because the command is 0 in a new ``MjData``. Other actuators can also act without a command
-    (``velocity``, ``intvelocity``, ``general``, ``muscle``).
+    The actuator ``<position joint="elbow" kp="100"/>`` holds the joint at the command. In a new ``MjData``
+    the command is 0. So without a command of your program, the actuator holds the joint at 0. Other actuators
+    can also act without a command (``velocity``, ``intvelocity``, ``general``, ``muscle``).
 
     - MuJoCo 4.0 adds the force of the actuator to forward dynamics, even if your program never sets
       ``data.ctrl``. ``mj_inverse`` does not subtract it.
     - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) drop actuators. Drake 1.51 adds
       an actuator without a controller.
 
-    The effect is the force of the actuator. For ``position`` it is the gain times the distance from 0. So
-    MuJoCo holds the robot, and in the other engines it falls.
+    The effect is the force of the actuator. For ``position`` it is the gain times the distance from 0. So the
+    actuators hold the robot in MuJoCo, and the robot falls in the other engines.
 
     What to do: write the gains into your controller. The file is correct, so ``dynx doctor --fix`` does not
     change it. The doctor compares without actuators, and prints the call that switches them off in MuJoCo.
@@ -198,8 +200,9 @@ class EqualityAsConstraint(CallingRule):
     - Drake 1.51 adds a constraint for ``connect`` and ``weld``. A continuous plant with this constraint
       computes no forward dynamics. Inverse dynamics ignores the constraint. Drake drops other elements, with
       a warning.
-    - Pinocchio 4.1: ``buildModelFromMJCF`` leaves loops open. ``buildModelAndConstraintsFromMJCF`` returns
-      the constraints separately. PyBullet 3.2.7 (``loadMJCF``) drops them.
+    - In Pinocchio 4.1, ``buildModelFromMJCF`` leaves loops open. ``buildModelAndConstraintsFromMJCF`` returns
+      the constraints separately.
+    - PyBullet 3.2.7 (``loadMJCF``) drops the constraints.
 
     The effect is large in robots with closed loops, such as Cassie.
 

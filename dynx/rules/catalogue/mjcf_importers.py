@@ -50,10 +50,12 @@ class InertiaByDefaultClass(EditingRule):
 
     ``<default class="part"><geom mass="2"/></default>`` gives a mass to each ``<geom class="part"/>``.
 
-    - MuJoCo 4.0 applies all attributes of a class. A class inherits the attributes of the class around it.
+    - MuJoCo 4.0 applies all attributes of a class. A class inherits the attributes of the class that contains
+      it.
     - Pinocchio 4.1 (``buildModelFromMJCF``) applies the density and the size of a class, but not its mass,
-      type, position or orientation. It then computes the mass of the body from the density of water.
-    - Drake 1.51 loses inherited attributes if a class on the way has no ``<geom>``.
+      type, position or orientation. If only the class states the mass, Pinocchio computes the mass from the
+      density of water.
+    - Drake 1.51 loses inherited attributes if one of the nested classes has no ``<geom>``.
     - PyBullet 3.2.7 (``loadMJCF``) applies only few attributes of a class.
 
     The effect: the mass of the body is wrong by any factor.
@@ -100,17 +102,17 @@ class InertiaByCompilerSetting(EditingRule):
     """DX602 inertia-by-compiler-setting: A setting of the compiler changes masses or inertias, and importers
     ignore it.
 
-    ``<compiler>`` may select the geoms that have a mass (``inertiagrouprange``), raise small masses and
-    moments (``boundmass``, ``boundinertia``), replace impossible moments (``balanceinertia``) and scale all
-    of them (``settotalmass``).
+    ``<compiler>`` has settings that change masses. ``inertiagrouprange`` selects the geoms that have a mass.
+    ``boundmass`` and ``boundinertia`` raise small masses and moments. ``balanceinertia`` replaces impossible
+    moments. ``settotalmass`` scales all masses and moments.
 
-    - MuJoCo 4.0 applies all of these.
+    - MuJoCo 4.0 applies all these settings.
     - Pinocchio 4.1 (``buildModelFromMJCF``) applies only ``boundmass`` and ``boundinertia``.
-    - Drake 1.51 applies none of them, and refuses moments that ``balanceinertia`` would replace.
-    - PyBullet 3.2.7 (``loadMJCF``) applies none.
+    - Drake 1.51 applies no such setting, and refuses moments that ``balanceinertia`` would replace.
+    - PyBullet 3.2.7 (``loadMJCF``) applies no such setting.
 
-    The effect: engines have other masses or inertias than MuJoCo. ``settotalmass`` changes the mass of the
-    whole robot.
+    The effect: other engines have other masses or inertias than MuJoCo. ``settotalmass`` changes the mass of
+    the whole robot.
 
     What to do: write an ``<inertial>`` with the final numbers for each body, as ``dynx doctor --fix`` does.
     """
@@ -165,13 +167,13 @@ class OrientationOtherThanQuaternion(EditingRule):
     """DX603 orientation-other-than-quaternion: An orientation is not a quaternion, and some importers read it
     differently.
 
-    MJCF has five attributes for an orientation: ``quat``, ``axisangle``, ``euler`` in the sequence
-    ``eulerseq``, ``xyaxes`` and ``zaxis``.
+    MJCF has five attributes for an orientation: ``quat``, ``axisangle``, ``euler``, ``xyaxes`` and ``zaxis``.
+    The setting ``eulerseq`` states the sequence of the angles of ``euler``.
 
     - MuJoCo 4.0 and Drake 1.51 read all five in the same way.
     - Pinocchio 4.1 (``buildModelFromMJCF``) does not normalise the axis of ``axisangle``. In ``eulerseq`` it
       reads capital letters (fixed axes) as small letters (axes that rotate with the frame).
-    - PyBullet 3.2.7 (``loadMJCF``) reads only ``quat`` as MuJoCo does. It reads angles of ``euler`` with the
+    - PyBullet 3.2.7 (``loadMJCF``) reads only ``quat`` correctly. It reads angles of ``euler`` with the
       opposite sign or as degrees, and drops the other three attributes.
 
     The effect: the body, and all bodies that it carries, have another pose.
@@ -208,12 +210,13 @@ class InertiaNotPrincipal(EditingRule):
     """DX611 inertia-not-principal: An ``<inertial>`` of MJCF has products of inertia, which PyBullet
     drops.
 
-    ``fullinertia`` states the six entries of a tensor. ``diaginertia`` states three moments about the axes of
-    the ``<inertial>``.
+    The attribute ``fullinertia`` states the six entries of a tensor. The attribute ``diaginertia`` states
+    three moments about the axes of the ``<inertial>``.
 
-    - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read both.
-    - PyBullet 3.2.7 (``loadMJCF``) has an inertial frame and three moments for each body. It reads the
-      orientation of the frame. The remedy of DX610 sets the moments, but no products of inertia.
+    - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read both attributes.
+    - PyBullet 3.2.7 (``loadMJCF``) stores an inertial frame and three moments for each body. It reads the
+      orientation of the frame from the file. The remedy of DX610 sets the moments, but cannot set products of
+      inertia.
 
     The effect: the products of inertia are lost.
 
@@ -257,13 +260,13 @@ class SeveralJointsInBody(EditingRule):
 
     - MuJoCo 4.0, Pinocchio 4.1 and PyBullet 3.2.7 (``loadMJCF``) place all joints at the body.
     - Drake 1.51 adds bodies between these joints, such as ``wrist0`` and ``wrist1``. It places all joints
-      except the last at the origin of the parent, and the offset of the body (``pos`` and orientation) after
-      them. So the body rotates about the origin of its parent.
+      except the last at the origin of the parent. The offset of the body (``pos`` and orientation) comes
+      after these joints. So the body rotates about the origin of its parent.
 
     The effect: the body, and all bodies that it carries, have another pose.
 
-    What to do: write an outer body with the pose and without joints, and an inner body with the joints, as
-    ``dynx doctor --fix`` does.
+    What to do: write two nested bodies, as ``dynx doctor --fix`` does. The outer body has the pose and no
+    joints, and the inner body has the joints.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -354,7 +357,7 @@ class SeveralBodiesInWorld(Rule):
 class MjcfInSinglePrecision(Rule):
     """DX612 mjcf-in-single-precision: PyBullet reads the numbers of MJCF in single precision.
 
-    A number such as 0.1 has no exact binary form: in double precision it is wrong by 1e-17, in single
+    A number such as 0.1 has no exact binary form. In double precision it is off by 1e-17, and in single
     precision by 1e-9.
 
     - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read double precision. MuJoCo holds meshes in single precision.
@@ -363,8 +366,8 @@ class MjcfInSinglePrecision(Rule):
     The effect: every quantity has an error of about 1e-8. This is too small to see in a simulation. But in a
     comparison with the tolerance 1e-12, it hides other differences.
 
-    What to do: nothing, or compare with ``--tolerance 1e-6``. An edit of the file cannot remove the cause. So
-    the report gives as its effect the difference that remains after all other causes are removed.
+    What to do: compare with ``--tolerance 1e-6``. An edit of the file cannot remove the cause. So the report
+    measures the effect as the difference that remains after all other causes are removed.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -498,15 +501,15 @@ class InertiaFromShapesOfMjcf(CallingRule):
 
     - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 read both.
     - PyBullet 3.2.7 (``loadMJCF``) reads the mass and the centre of mass. It computes the moments from the
-      bounding box of the shapes; without shapes they are 0. For a body without ``<inertial>`` it computes the
-      mass from a density of 1000 kg/m^3, and ignores the attribute ``mass`` of a geom. With the flag
-      ``URDF_USE_INERTIA_FROM_FILE`` all moments are 0.
+      bounding box of the shapes. Without shapes the moments are 0. For a body without ``<inertial>`` it
+      computes the mass from a density of 1000 kg/m^3, and ignores the attribute ``mass`` of a geom. With the
+      flag ``URDF_USE_INERTIA_FROM_FILE`` all moments are 0.
 
     The effect: every body has another inertia. In most robots the mass matrix is off by tens of per cent.
 
-    What to do: set the masses and the moments after loading, or convert the file to URDF
-    (``dynx convert --to urdf``) and load it with this flag. The file is correct, so ``dynx doctor --fix``
-    does not change it. The doctor prints the call that sets the masses and the moments.
+    What to do: set the masses and the moments after loading. Or convert the file to URDF
+    (``dynx convert --to urdf``), and load this URDF file with the flag. The file is correct, so
+    ``dynx doctor --fix`` does not change it. The doctor prints the call that sets the masses and the moments.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -590,7 +593,7 @@ class ModelWithoutName(EditingRule):
 
     The attribute ``model`` of ``<mujoco>`` is optional.
 
-    - MuJoCo 4.0 calls the model ``MuJoCo Model``; Pinocchio 4.1 and PyBullet 3.2.7 need no name.
+    - MuJoCo 4.0 then calls the model ``MuJoCo Model``. Pinocchio 4.1 and PyBullet 3.2.7 need no name.
     - Drake 1.51 refuses the file: "Your robot must have a name attribute or a model name must be specified".
 
     What to do: write a name. ``dynx doctor --fix`` writes ``model="robot"``.
@@ -665,8 +668,8 @@ class MeshOfMjcfNotObj(Rule):
 class MeshOfMjcfNotFound(Rule):
     """DX617 mesh-of-mjcf-not-found: The file of a mesh is not where the model says.
 
-    The path in ``<mesh file="arm.obj"/>`` is relative to ``meshdir`` of the compiler, which is relative to
-    the folder of the file.
+    The path in ``<mesh file="arm.obj"/>`` is relative to the folder ``meshdir`` of the compiler. ``meshdir``
+    is relative to the folder of the file.
 
     - MuJoCo 4.0 refuses the file, even if no geom uses the mesh: "Error opening file". Drake 1.51 also
       refuses it: "The mesh asset could not be found".
@@ -675,7 +678,7 @@ class MeshOfMjcfNotFound(Rule):
 
     dynx needs the mesh only if the mass of a body follows from it.
 
-    What to do: put the file there, or correct the path, capitals included.
+    What to do: put the file there, or correct the path (capital letters matter).
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -699,12 +702,12 @@ class PlaceOfFixedBody(Rule):
     base.
 
     - MuJoCo 4.0 and Drake 1.51 read the pose and the mass of this body.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) puts this body, and with it the robot, at the origin. The frame
-      of the body has no mass.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) puts this body at the origin, and so moves the whole robot. The
+      frame of the body has no mass.
     - PyBullet 3.2.7 lets the robot float (DX619).
 
     The effect: all poses are off by the pose of this body. If the body is rotated, Jacobians and the
-    equations of motion differ, too.
+    equations of motion also differ.
 
     What to do: transform the poses in your program, or convert the file to URDF (``dynx convert --to urdf``).
     ``dynx doctor --fix`` does not change the file.

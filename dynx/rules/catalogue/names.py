@@ -30,19 +30,19 @@ class LinkNamedWorld(Rule):
     robot with a fixed base. In other cases:
 
     - The root link with a floating base: Drake 1.51.1 mistakes the link for the world, and fixes the robot to
-      it. If the link has no ``<inertial>``, PyBullet 3.2.7 gives it no mass (a link of another name gets 1
-      kg), and fixes it to the world. MuJoCo 4.0.0 mistakes the link for its world body, which cannot have a
-      free joint.
+      it. MuJoCo 4.0.0 mistakes the link for its world body, which cannot have a free joint. If the link has
+      no ``<inertial>``, PyBullet 3.2.7 gives it no mass (a link of another name gets 1 kg), and so fixes it
+      to the world.
     - A link that is not the root: Drake refuses the file ("form one or more loops"). MuJoCo drops the mass
       and the tensor of the link without a warning.
     - Pinocchio 4.1.0 gives the name no meaning.
 
-    The effect: the base of the robot cannot move, or (MuJoCo) the mass matrix lacks this link.
+    The effect: the base of the robot cannot move. In MuJoCo the mass matrix may lack this link.
 
     What to do: use the name ``world`` only for the root link of a robot with a fixed base. If the link stands
     for the ground, load the robot with a fixed base.
 
-    ``dynx doctor --fix`` renames the link to ``world_link``, also in the joints that name it and in
+    ``dynx doctor --fix`` renames the link to ``world_link``. It also changes the name in joints and in
     ``<gazebo reference>``. If a program looks the link up by its old name, ``--choose DX109=keep`` keeps the
     name.
     """
@@ -80,20 +80,20 @@ _UNIVERSE = "universe"
 class JointNamedUniverse(EditingRule):
     """DX213 joint-named-universe: A fixed joint is named universe, which is Pinocchio's name for the world.
 
-    The list of frames of Pinocchio 4.1 begins with a frame ``universe``, which is the world. A fixed joint
-    becomes a frame with the name of the joint. To attach the child link, Pinocchio looks up this name, and
-    finds the world. The file loads without a warning, and the robot lacks the mass beyond the joint. For a
-    tool at the end of an arm, the mass matrix was off by 40 %.
+    The list of frames of Pinocchio 4.1 begins with a frame ``universe``, which is the world. Pinocchio makes
+    a frame of each fixed joint, with the name of the joint. To attach the child link, it looks up this name.
+    For ``universe`` it finds the world. The file loads without a warning, but the robot lacks the mass beyond
+    the joint. For a tool at the end of an arm, the mass matrix was off by 40 %.
 
-    A moving joint of that name does not change the model, but ``model.getJointId("universe")`` is the world
-    and not that joint.
+    A moving joint of this name does not change the model. But ``model.getJointId("universe")`` returns the
+    world instead of this joint.
 
     PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file as intended. A link named ``universe`` is harmless
-    in all four.
+    in all four engines.
 
-    What to do: give the joint another name. ``dynx doctor --fix`` renames it to ``universe_joint``, also in
-    mimic joints, transmissions and Gazebo references. If a program looks the joint up by its name, change the
-    program, too.
+    What to do: give the joint another name. ``dynx doctor --fix`` renames it to ``universe_joint``. It also
+    changes the name in mimic joints, transmissions and Gazebo references. If a program looks up the joint by
+    its name, also change the program.
     """
 
     advice = "Give the joint another name."
@@ -121,15 +121,15 @@ class JointNamedRootJoint(EditingRule):
     base. Pinocchio names the joint of the floating base ``root_joint``.
 
     - Pinocchio 4.1 attaches the child link of a moving joint to the frame with the joint's name. For a joint
-      named ``root_joint`` it finds the frame of the floating base: the link is fixed to the base, and the
+      named ``root_joint`` it finds the frame of the floating base. So it fixes the link to the base, and the
       joint moves nothing. The file loads without a warning. The mass matrix of an arm was off by 50 to 90 %.
-      With a fixed base, and for a fixed joint or a link of this name, there is no error.
+      With a fixed base there is no error. A fixed joint or a link of this name also causes no error.
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the file as intended.
 
-    What to do: give the joint another name. ``dynx doctor --fix`` renames it to ``root_joint_1``, also in
-    mimic joints, transmissions and Gazebo references. If a program looks the joint up by its name, change the
-    program, too. If you must keep the name, give the joint of the floating base another name in the call:
-    ``buildModelFromUrdf(path, JointModelFreeFlyer(), "free_flyer")``.
+    What to do: give the joint another name. ``dynx doctor --fix`` renames it to ``root_joint_1``. It also
+    changes the name in mimic joints, transmissions and Gazebo references. If a program looks up the joint by
+    its name, also change the program. If you must keep the name, give the joint of the floating base another
+    name in the call: ``buildModelFromUrdf(path, JointModelFreeFlyer(), "free_flyer")``.
     """
 
     advice = "Give the joint another name."
@@ -182,16 +182,16 @@ class RobotWithoutName(EditingRule):
 class PercentInName(EditingRule):
     """DX414 percent-in-name: A name contains %, which PyBullet uses as a printf format.
 
-    PyBullet 3.2.7 prints messages with names, and uses some of these messages as the format of ``printf``.
-    ``%p`` then prints memory contents. ``%s`` reads memory and ``%n`` writes memory, which can end the
-    process. This happens only if PyBullet prints such a message, for example about a link without
+    PyBullet 3.2.7 prints messages with names, and uses some of these messages as the format of ``printf``. In
+    such a message ``%p`` prints memory contents, ``%s`` reads memory and ``%n`` writes memory. This can end
+    the process. This happens only if PyBullet prints such a message, for example about a link without
     ``<inertial>``. So a file can load for years and then crash. dynx does not give such a file to PyBullet.
 
     Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 are not affected.
 
     What to do: use letters, digits and ``_`` in names. ``dynx doctor --fix`` replaces ``%`` by ``_`` in the
     name, and wherever the file uses the name (parents and children of joints, mimic joints, Gazebo
-    references). If a program looks a link or joint up by the old name, change the program, too.
+    references). If a program looks up a link or joint by the old name, also change the program.
     """
 
     stage = "reading"

@@ -24,9 +24,10 @@ class DecimalComma(MisspelledNumberRule):
     In URDF the decimal separator is a point. A program that prints numbers in the current locale, such as a
     CAD exporter on a German or French computer, writes a comma.
 
-    - Pinocchio 4.1: with such a number in the ``<mass>`` or ``<origin>`` of an ``<inertial>`` it drops the
-      whole inertial, so the link has no mass. With such a number in the ``<inertia>`` it drops only the
-      tensor, so the link is a point mass. It prints a line on stderr. In a ``<joint>``, it refuses the file.
+    - Pinocchio 4.1 refuses the file if the number is in a ``<joint>``. If it is in the ``<mass>`` or
+      ``<origin>`` of an ``<inertial>``, Pinocchio drops the whole inertial, so the link has no mass. If it is
+      in the ``<inertia>``, Pinocchio drops only the tensor, so the link is a point mass. In both cases it
+      prints a line on stderr.
     - PyBullet 3.2.7 reads each number up to the comma: ``2,5`` is 2, and ``0,03`` is 0. It prints no warning.
     - MuJoCo 4.0 refuses the file, and names the line.
     - Drake 1.51 reads a single number up to the comma, and refuses a vector.
@@ -36,9 +37,9 @@ class DecimalComma(MisspelledNumberRule):
 
     What to do: write a point. ``dynx doctor --fix`` writes a point in every number of links and joints.
 
-    ``1,250`` may also mean one thousand two hundred and fifty. dynx reads the comma as a decimal separator,
-    unless you write ``--choose DX401=thousands``. A number with commas and a point, such as ``1,250.5``, is
-    unambiguous.
+    In some files ``1,250`` means one thousand two hundred and fifty. dynx reads the comma as a decimal
+    separator, unless you write ``--choose DX401=thousands``. A number with commas and a point, such as
+    ``1,250.5``, is unambiguous.
     """
 
     advice = "Write decimals with a point."
@@ -66,12 +67,12 @@ class CommaBetweenNumbers(MisspelledNumberRule):
     - Pinocchio 4.1 refuses the file if the vector is in a ``<joint>``. In an ``<inertial>`` it drops the
       whole inertial with a line on stderr, so the link has no mass.
     - PyBullet 3.2.7 reads ``1, 2, 3`` correctly, because it reads the number at the beginning of each word.
-      In ``1,2,3`` it finds one word instead of three, prints a warning and uses zeros. A joint is then at the
-      origin of its parent.
+      In ``1,2,3`` it finds one word instead of three. It then prints a warning and uses zeros, so a joint is
+      at the origin of its parent.
     - MuJoCo 4.0 and Drake 1.51 refuse the file.
 
-    The effect is a missing offset or rotation: the positions of all links beyond it have a relative error of
-    order 1. An example is ``bicycle/bike.urdf``, which comes with PyBullet.
+    The effect is a missing offset or rotation: the positions of all links beyond this place have a relative
+    error of order 1. An example is ``bicycle/bike.urdf``, which comes with PyBullet.
 
     What to do: separate numbers by blanks. ``dynx doctor --fix`` writes blanks. In ``0,2 0,5 0,1`` the commas
     are decimal separators, see DX401.
@@ -91,9 +92,10 @@ class TextAfterNumber(MisspelledNumberRule):
     Examples of such text are a second point, a unit, a Fortran exponent (``1.5d-3``), or the ``x`` of a
     hexadecimal number.
 
-    - Pinocchio 4.1: with such a number in the ``<mass>`` or ``<origin>`` of an ``<inertial>`` it drops the
-      whole inertial, so the link has no mass. With such a number in the ``<inertia>`` it drops only the
-      tensor, so the link is a point mass. It prints a line on stderr. In a ``<joint>``, it refuses the file.
+    - Pinocchio 4.1 refuses the file if the number is in a ``<joint>``. If it is in the ``<mass>`` or
+      ``<origin>`` of an ``<inertial>``, Pinocchio drops the whole inertial, so the link has no mass. If it is
+      in the ``<inertia>``, Pinocchio drops only the tensor, so the link is a point mass. In both cases it
+      prints a line on stderr.
     - PyBullet 3.2.7 reads the number at the beginning and ignores the rest, without a warning. It reads
       ``1.5d-3`` as 1.5, a thousand times too large.
     - MuJoCo 4.0 refuses the file and names the line, but reads hexadecimal numbers.
@@ -101,12 +103,12 @@ class TextAfterNumber(MisspelledNumberRule):
       0.
 
     The effect ranges from none (for example in an effort limit) to a link without mass. An example is
-    ``biped/biped2d_pybullet.urdf``, which comes with PyBullet and has the number ``-1.57.``.
+    ``biped/biped2d_pybullet.urdf``, which comes with PyBullet. It has the number ``-1.57.``.
 
     What to do: write only the number, in SI units. ``dynx doctor --fix`` removes a point or the name of the
     SI unit after a number (``1.57.``, ``2.5 kg``). It writes a Fortran exponent with ``e``, and a hexadecimal
-    number as a decimal number. If the text changes the meaning of the number (``25mm``, ``90deg``, ``1/5``),
-    or there is no number at the beginning (``heavy``), see DX420.
+    number as a decimal number. DX420 describes text that changes the meaning of the number (``25mm``,
+    ``90deg``, ``1/5``), and words without a number at the beginning (``heavy``).
     """
 
     advice = "Write only the number, in SI units."
@@ -132,9 +134,9 @@ class VectorOfWrongLength(MisspelledNumberRule):
       a warning and uses zeros for all three. In an ``<axis>`` it refuses two numbers.
     - MuJoCo 4.0 and Drake 1.51 refuse the file.
 
-    The effect: if a vector becomes zero, the positions of all links beyond it have a relative error of order
-    1. An example is ``quadruped/microtaur/microtaur.urdf``, which comes with PyBullet and has vectors of four
-    numbers.
+    The effect: if a vector becomes zero, the positions of all links beyond this place have a relative error
+    of order 1. An example is ``quadruped/microtaur/microtaur.urdf``, which comes with PyBullet. It has
+    vectors of four numbers.
 
     What to do: find out which three numbers were intended. ``dynx doctor --fix`` keeps the first three
     numbers, and adds zeros for missing numbers. With ``--choose DX404=default`` it removes the attribute
@@ -171,13 +173,16 @@ class BlankAfterNumber(MisspelledNumberRule):
 
     - In a ``<mass>`` it prints on stderr that the mass "is not a float", and drops the whole inertial, so the
       link has no mass.
-    - In an ``<inertia>`` it drops only the tensor, also with a line on stderr, so the link is a point mass.
+    - In an ``<inertia>`` it also prints a line on stderr. It drops only the tensor, so the link is a point
+      mass.
     - In a ``<limit>``, ``<dynamics>`` or ``<mimic>`` of a joint it refuses the file.
 
     PyBullet 3.2.7, MuJoCo 4.0, Drake 1.51 and dynx read the number. All engines accept blanks, tabs and line
-    breaks before a number. No engine treats a no-break space (U+00A0) as a blank. After a number, MuJoCo
-    refuses it. Before a number, PyBullet reads 0, and MuJoCo and Drake refuse the file. All engines accept
-    blanks between and around the three numbers of a vector (but not tabs, see DX406).
+    breaks before a number. All engines accept blanks between and around the three numbers of a vector, but
+    not tabs (DX406).
+
+    No engine treats a no-break space (U+00A0) as a blank. If it follows a number, MuJoCo refuses the file. If
+    it precedes a number, PyBullet reads 0, and MuJoCo and Drake refuse the file.
 
     The effect is a link without mass, or without a moment of inertia. The relative error of the mass matrix
     is of order 0.01 to 1.
@@ -205,12 +210,12 @@ class TabInVector(MisspelledNumberRule):
     - Pinocchio 4.1 separates numbers only at blanks. It refuses a tab in a vector of a ``<joint>``. In an
       ``<inertial>`` it drops the whole inertial with a line on stderr, so the link has no mass.
     - PyBullet 3.2.7 also separates numbers only at blanks. If it finds one word instead of three, it prints a
-      warning and uses zeros. In a vector with blanks and line breaks it can find three words that are not the
-      three numbers. It refuses a tab in an ``<axis>``.
+      warning and uses zeros. In a vector with blanks and line breaks it may find three words, but these are
+      not the three numbers. It refuses a tab in an ``<axis>``.
     - MuJoCo 4.0 and Drake 1.51 accept tabs and line breaks, and refuse the no-break space.
 
-    The effect is a missing offset: the positions of all links beyond it have a relative error of order 1. The
-    error of the mass matrix of a small arm was 0.1.
+    The effect is a missing offset: the positions of all links beyond this place have a relative error of
+    order 1. The error of the mass matrix of a small arm was 0.1.
 
     What to do: separate numbers by blanks, as ``dynx doctor --fix`` does.
     """
@@ -232,8 +237,8 @@ class InfiniteLimit(MisspelledNumberRule):
     - PyBullet 3.2.7 and MuJoCo 4.0 read infinity. MuJoCo refuses ``1e999``.
 
     What to do: write ``type="continuous"`` without ``lower`` and ``upper``, or write a number that no joint
-    reaches. ``dynx doctor --fix`` writes the largest double, 1.7976931348623157e+308, which all four engines
-    read and which dynx reads as "no limit". For infinite masses, inertias and positions, see DX420.
+    reaches. ``dynx doctor --fix`` writes the largest double, 1.7976931348623157e+308. All four engines read
+    this number, and dynx reads it as "no limit". For infinite masses, inertias and positions, see DX420.
     """
 
     advice = "Write a large finite number, or omit the limit."
@@ -280,25 +285,26 @@ _ELEMENTS_THAT_NEED_NUMBERS = ("mass", "inertia")
 class AttributeWithoutNumber(MisspelledNumberRule):
     """DX420 attribute-without-number: An attribute that should hold numbers is empty or holds other text.
 
-    Some exporters write ``<limit lower="" upper="" .../>`` if the user entered no limits, and ``nan`` for the
-    centre of mass of a body without mass. Other examples are ``none`` and ``25mm``.
+    If the user entered no limits, some exporters write ``<limit lower="" upper="" .../>``. Some write ``nan``
+    for the centre of mass of a body without mass. Other examples are ``none`` and ``25mm``.
 
-    - Pinocchio 4.1 refuses the file if the attribute is in a ``<joint>``, also in a fixed joint. In an
+    - Pinocchio 4.1 refuses the file if the attribute is in a ``<joint>``, even in a fixed joint. In an
       ``<inertial>`` it drops the tensor or the whole inertial with a line on stderr.
     - Drake 1.51 refuses the file.
-    - PyBullet 3.2.7 reads any word as 0. It reads ``nan`` and ``inf`` as such numbers, and results are then
-      NaN.
+    - PyBullet 3.2.7 reads any word as 0, except ``nan`` and ``inf``. It reads these as not-a-number and
+      infinity, so results are NaN.
     - MuJoCo 4.0 reads an empty attribute of a joint as missing, and accepts ``nan`` in a joint. It refuses
       words, and an empty mass or moment.
 
-    dynx refuses the attribute, and names the line, unless it does not need the element (such as the limits of
-    a fixed joint). An empty ``xyz`` or ``rpy`` is DX408, and an infinite limit is DX407. dynx does not
-    correct an expression of xacro, such as ``${mass}``: expand the file with ``xacro``.
+    dynx refuses the file and names the line, unless dynx does not need the element. For example, it does not
+    need the limits of a fixed joint. An empty ``xyz`` or ``rpy`` is DX408, and an infinite limit is DX407.
+    dynx does not correct an expression of xacro, such as ``${mass}``: expand the file with ``xacro``.
 
     What to do: write the numbers. The file does not contain the missing numbers, so ``dynx doctor --fix``
     leaves the attributes as they are and lists each with its line. It removes only empty attributes that have
-    a default or that no engine needs. ``--choose DX420=guess`` writes 0 for a mass, an entry of a tensor and
-    a word in a vector. It removes any other such attribute, so that the default applies.
+    a default or that no engine needs. ``--choose DX420=guess`` writes 0 for a mass, for an entry of a tensor
+    and for a word in a vector. It removes all other attributes without a number, so that their defaults
+    apply.
     """
 
     advice = "Write the numbers, or remove the attribute."
@@ -378,8 +384,9 @@ class ExpressionNotExpanded(EditingRule):
       Drake 1.51 refuses it in these limits and in this ``<mimic>``.
     - PyBullet 3.2.7 reads 0, without a warning: the shape is at another place, or has no size.
 
-    In a ``<visual>`` every engine accepts the expression. In other elements of a joint, and in an
-    ``<inertial>``, dynx refuses it, because the dynamics depends on the number.
+    In a ``<visual>`` every engine accepts the expression. In an ``<inertial>``, and in the elements of a
+    joint that this list does not name, dynx refuses the expression, because the dynamics depends on the
+    number.
 
     What to do: write the number, or name the file ``.xacro``, so that dynx expands it with ``xacro``.
     ``dynx doctor --fix`` calculates simple expressions (numbers, ``pi``, ``+ - * /``). For any other

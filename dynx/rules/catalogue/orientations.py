@@ -35,8 +35,8 @@ class OrientationAsQuaternion(EditingRule):
     - PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 ignore the attribute without a warning: the origin has no
       rotation.
 
-    The effect: if the origin is that of a joint, the positions of all links beyond it have a relative error
-    of order 1. If it is that of an ``<inertial>``, the mass matrix has such an error.
+    The effect: if the origin is that of a joint, the positions of all links beyond this place have a relative
+    error of order 1. If it is that of an ``<inertial>``, the mass matrix has such an error.
 
     What to do: write the orientation as ``rpy``, with all digits. ``dynx doctor --fix`` computes ``rpy`` from
     the quaternion. The orientation is the same to rounding.
@@ -75,9 +75,10 @@ class UnreadableQuaternion(EditingRule):
 
     dynx refuses such an origin, and names the line.
 
-    What to do: write one orientation, as ``rpy``. If there is an ``rpy``, ``dynx doctor --fix`` keeps it and
-    removes the quaternion. If there are four numbers separated by commas or tabs, it writes them as ``rpy``.
-    Otherwise it removes the quaternion, so that the origin has no rotation, as three engines read it.
+    What to do: write one orientation, as ``rpy``. If the origin has an ``rpy``, ``dynx doctor --fix`` keeps
+    it and removes the quaternion. If commas or tabs separate the four numbers, it converts the quaternion to
+    ``rpy``. Otherwise it removes the quaternion. The origin then has no rotation, as in PyBullet, MuJoCo and
+    Drake.
     """
 
     stage = "reading"
@@ -114,12 +115,11 @@ class AngleInDegrees(Rule):
 
     The rule reports two patterns. First, an ``rpy`` angle is above a full turn, 6.28 rad. Nobody writes such
     an orientation in radians, but 10, 45, 90 and 180 are usual in degrees. Second, both limits of a revolute
-    joint are multiples of 5 between -360 and 360, and at least one of them is 30 or more. 30 rad are five
-    turns, and 30 degrees is a usual limit. The rule does not report limits of -100 and 100, because they
+    joint are multiples of 5 between -360 and 360, and at least one of them is 30 or more. 30 degrees is a
+    usual limit, but 30 rad are five turns. The rule does not report limits of -100 and 100, because they
     often mean "unlimited".
 
-    All engines read radians: 90 is 14.3 turns. They agree, but the robot has wrong poses, or joints that do
-    not stop at their real limits.
+    All engines read radians: 90 is 14.3 turns. So all engines agree on wrong poses, or on wrong limits.
 
     The rule only guesses that the unit is degrees, so no edit removes the cause. The message gives the value
     in radians.
@@ -180,8 +180,9 @@ class AngleCutShort(EditingRule):
     ``1.57`` is 0.0008 rad less than pi/2, and ``3.14`` is 0.0016 rad less than pi. At the end of an arm of 1
     m the error is 0.8 mm or 1.6 mm, more than the repeatability of usual robots. Axes that are parallel in
     the CAD model are then not parallel in the file. So closed-form inverse kinematics (IKFast, the formulas
-    for a spherical wrist) finds no solution, or a wrong solution. The rule reports angles in the ``<origin>``
-    of a joint that are a multiple of pi/4, up to a full turn, rounded or truncated to two or three decimals.
+    for a spherical wrist) finds no solution, or a wrong solution. The rule examines angles in the
+    ``<origin>`` of a joint. It reports multiples of pi/4, up to a full turn, that were rounded or truncated
+    to two or three decimals.
 
     All engines read the number unchanged.
 
@@ -235,8 +236,8 @@ class QuaternionWithoutVersion(EditingRule):
     reads it.
 
     ``<origin quat_xyzw="..."/>`` is part of URDF 1.1 and 1.2. Without ``<robot version="1.1">`` (or 1.2) a
-    file has version 1.0, and every engine ignores the quaternion without a warning. The engines agree: the
-    origin has the rotation of ``rpy``, or none.
+    file has version 1.0. Then every engine ignores the quaternion without a warning. So all engines agree:
+    the origin has the rotation of ``rpy``, or no rotation.
 
     What to do: write the orientation as ``rpy``, which every engine reads. By default ``dynx doctor --fix``
     leaves the file as it is. With ``--choose DX530=rpy`` it writes the quaternion as ``rpy``, which changes

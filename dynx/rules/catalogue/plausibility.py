@@ -32,26 +32,29 @@ class InertiaBeyondGeometry(Rule):
 
     The rule has two bounds.
 
-    First, if no point of a body of mass m is farther than R from an axis, the moment of inertia about this
-    axis is at most m R^2. It is m R^2 only if all mass is at the distance R. Real parts have a third of it or
-    less. The rule uses the principal axes of the tensor through the centre of mass. R is the reach of all
-    shapes of the link and of the links rigidly connected to it. A mesh counts as its convex hull, so R is
-    never too small.
+    The first bound is a largest moment. Let R be the largest distance of a point of the body from an axis.
+    Then the moment of inertia about this axis is at most m R^2, where m is the mass. Real parts have a third
+    of this bound or less. The rule uses the principal axes of the tensor through the centre of mass. It
+    computes R from all shapes of the link and of the links rigidly connected to it. A mesh counts as its
+    convex hull, so R is never too small.
 
-    Second, let the hull reach from -a to b along a direction, as seen from the centre of mass. The mean
-    square of the mass's distance in this direction is then at most a b (Bhatia and Davis 2000). The tensor
-    determines this mean square: it is half the sum of the three moments, minus the moment about the
-    direction, divided by the mass. The rule examines thirteen directions (the link's axes and diagonals), and
-    the three principal directions. Shapes are often drawn without the motor inside. So the rule widens the
-    hull by a hundredth of its diagonal, and reports a root mean square only if it is a tenth above the bound.
-    This bound finds, for example, a plate with the tensor of a block.
+    The second bound is a largest extent. Let the hull of the shapes reach from -a to b along a direction, as
+    seen from the centre of mass. Then the mean square of the mass's coordinate in this direction is at most a
+    b (Bhatia and Davis 2000). The tensor determines this mean square: half the sum of the three moments,
+    minus the moment about the direction, divided by the mass. The rule examines thirteen directions (the
+    link's axes and diagonals), and the three principal directions. For example, this bound finds a plate with
+    the tensor of a block. Shapes are often drawn without the motor inside. So the rule widens the hull by a
+    hundredth of its diagonal, and reports a root mean square only if it is more than a tenth above the bound.
 
-    Usual causes: the tensor is in kg mm^2 or g mm^2 instead of kg m^2. Or it was computed about the origin of
-    the link frame instead of the centre of mass. Or the mesh is scaled by 0.001 and the tensor is not. Or the
-    tensor is a placeholder.
+    Usual causes:
 
-    All engines use the numbers unchanged, so they agree with each other, but not with the real robot: torques
-    are too large, and controllers tuned with this model are too stiff.
+    - The tensor is in kg mm^2 or g mm^2 instead of kg m^2.
+    - The tensor was computed about the origin of the link frame instead of the centre of mass.
+    - The mesh is scaled by 0.001, but the tensor is not.
+    - The tensor is a placeholder.
+
+    All engines use the numbers unchanged. So they agree with each other, but not with the real robot: torques
+    are too large, and controllers that were tuned with this model are too stiff.
 
     The file does not contain the true tensor, so no edit removes the cause.
     """
@@ -139,11 +142,13 @@ class InertiaBelowGeometry(Rule):
     """DX502 inertia-below-geometry: The inertia is that of a body a hundred times smaller than the link's
     shape.
 
-    The radius of gyration k = sqrt(I / m) of a uniform body is a fifth to a half of its size: for a rod of
-    length l it is l/3.5, for a ball of diameter d it is d/3.2. The rule reports a link if its largest k is
-    below a hundredth of the diagonal of its shape. Usual causes: the tensor has a wrong unit, which makes it
-    too small by 1e-6 or 1e-9. Or it was written with too few digits (``1e-06`` everywhere). Or it is zero
-    because an importer required the element.
+    The radius of gyration k = sqrt(I / m) of a uniform body is a fifth to a half of its size. Examples are
+    l/3.5 for a rod of length l, and d/3.2 for a ball of diameter d. The rule reports a link if its largest k
+    is below a hundredth of the diagonal of its shape. Usual causes:
+
+    - The tensor has a wrong unit. It is then too small by a factor of 1e-6 or 1e-9.
+    - The tensor was written with too few digits (``1e-06`` everywhere).
+    - The tensor is zero, because an importer required the element.
 
     Engines that load such a tensor use it unchanged. Torques are too small, forward dynamics is badly
     conditioned, and simulators with a fixed time step may oscillate or diverge at such joints.
@@ -180,10 +185,12 @@ class CenterOfMassOutsideGeometry(Rule):
     to it, along the axes of the link frame. It widens the box by a hundredth of the diagonal, because shapes
     may be slightly too small.
 
-    Usual causes: the ``<origin>`` of ``<inertial>`` is in millimetres. Or it is in the frame of the CAD
-    assembly or of the parent link instead of the link's frame. Or it was mirrored for the other side of the
-    robot with a wrong sign. Or the mesh was moved by the ``<origin>`` of ``<visual>``, and the inertial was
-    not.
+    Usual causes:
+
+    - The ``<origin>`` of ``<inertial>`` is in millimetres.
+    - The ``<origin>`` is in the frame of the CAD assembly or of the parent link instead of the link's frame.
+    - The ``<origin>`` was mirrored for the other side of the robot with a wrong sign.
+    - The ``<origin>`` of ``<visual>`` moved the mesh, but the inertial was not moved.
 
     All engines use the numbers unchanged: gravity torques are wrong by the same amount in all of them.
 
@@ -268,18 +275,21 @@ class MassRatioExtreme(Rule):
     """DX505 mass-ratio-extreme: Two bodies that a joint connects differ in mass by a factor of a million or
     more.
 
-    Rigidly connected links count as one body. This rule does not report bodies without mass. If a joint
-    connects two bodies whose masses differ by a factor of a million, results lose six of the 16 digits of a
-    double. The worst case is a light body that carries a heavy one.
+    Rigidly connected links count as one body. This rule does not report bodies without mass. If the masses of
+    two connected bodies differ by a factor of a million, results lose six of the 16 digits of a double. The
+    worst case is a light body that carries a heavy body.
 
-    Simulators that solve joints as constraints between free bodies (ODE in Gazebo, contacts in Bullet and
-    MuJoCo) converge slowly or not at all, and joints drift apart and oscillate. Forward dynamics loses digits
-    in every engine, because the condition number of the mass matrix is about as large as the ratio of the
-    masses. Inverse dynamics is not affected, and engines agree on it.
+    Some simulators solve joints as constraints between free bodies (ODE in Gazebo, contacts in Bullet and
+    MuJoCo). They converge slowly or not at all, and joints drift apart and oscillate. Forward dynamics loses
+    digits in every engine, because the condition number of the mass matrix is about as large as the ratio of
+    the masses. Inverse dynamics is not affected, and engines agree on it.
 
-    Usual causes: a mass is in grams or tonnes, and others are in kilograms. Or a sensor frame has
-    ``mass value="1e-06"`` because an importer refused links without mass. Only the author of the file knows
-    the right mass, so no edit removes the cause.
+    Usual causes:
+
+    - A mass is in grams or tonnes, and other masses are in kilograms.
+    - A sensor frame has ``mass value="1e-06"``, because an importer refused links without mass.
+
+    Only the author of the file knows the right mass, so no edit removes the cause.
     """
 
     kind = "practice"
@@ -315,19 +325,23 @@ class DensityImplausible(Rule):
     Here a body is a group of rigidly connected links. The rule divides the mass of a body by two volumes.
 
     - The first volume is the bounding box of the body's shapes. The body is smaller than the box, so its true
-      density is higher than this quotient. The rule reports more than 25,000 kg/m^3 (osmium, the densest
-      metal, has 22,600). Each side of the box counts as at least a hundredth of its diagonal, because a thin
-      plate is often drawn too thin.
-    - The second volume is the largest single shape (of a mesh, its convex hull). The shapes together are at
-      least as large. The rule reports less than 1 kg/m^3 (air has 1.2).
+      density is higher than this quotient. The rule reports a quotient above 25,000 kg/m^3 (osmium, the
+      densest metal, has 22,600). Thin plates are often drawn too thin. So each side of the box counts as at
+      least a hundredth of its diagonal.
+    - The second volume is that of the largest single shape (a mesh counts as its convex hull). The shapes
+      together are at least as large, so the true density is lower than this quotient. The rule reports a
+      quotient below 1 kg/m^3 (air has 1.2).
 
-    Of the 1,122 such bodies in example-robot-data the median density is 500 kg/m^3. 98 % of them are between
-    20 and 21,400, and the least is 2.5 (a drone with an arm). The rule reports only the finger knuckles of
-    one hand, which have 50 g in cubes of 2 mm.
+    example-robot-data has 1,122 such bodies. Their median density is 500 kg/m^3. 98 % of them have between 20
+    and 21,400 kg/m^3, and the least is 2.5 (a drone with an arm). The rule reports only the finger knuckles
+    of one hand, which have 50 g in cubes of 2 mm.
 
-    Usual causes: a mass is in grams or tonnes. Or a shape is in millimetres without
-    ``scale="0.001 0.001 0.001"``. Or the shape is a tiny placeholder. Or an exporter computed the mass from a
-    mesh in the wrong unit.
+    Usual causes:
+
+    - A mass is in grams or tonnes.
+    - A shape is in millimetres without ``scale="0.001 0.001 0.001"``.
+    - The shape is a tiny placeholder.
+    - An exporter computed the mass from a mesh in the wrong unit.
 
     All engines use the numbers unchanged. A heavy finger dominates every torque of the arm that carries it.
 
@@ -365,13 +379,13 @@ _MICROGRAM = 1e-9
 class MassNegligible(Rule):
     """DX518 mass-negligible: A link has a mass below a microgram, which no part of a robot has.
 
-    A screw has a gram, and a grain of sand has a milligram. Masses such as 1e-10 or 1e-15 kg are placeholders
-    for an importer that refused a link without mass, or residues of a computation whose result is zero. In
-    example-robot-data the smallest mass that is not zero is 1e-9 kg, exactly a microgram.
+    A screw has a gram, and a grain of sand has a milligram. Masses such as 1e-10 or 1e-15 kg have two causes:
+    an importer that refused a link without mass, or a computation with rounding errors whose exact result is
+    zero. In example-robot-data the smallest mass that is not zero is 1e-9 kg, exactly a microgram.
 
-    Engines accept small masses, but MuJoCo 4.0.0 refuses a moving body below 1e-15 kg. If a joint carries
-    only such a link, a very small torque causes an acceleration of millions of rad/s^2. So a simulation
-    diverges with any time step, and forward dynamics loses digits.
+    Engines accept small masses. Only MuJoCo 4.0.0 refuses a moving body below 1e-15 kg. If a joint carries
+    only a link of such a mass, a very small torque causes an acceleration of millions of rad/s^2. So a
+    simulation diverges with any time step, and forward dynamics loses digits.
 
     What to do: if the link is a frame, write zero and attach it by a fixed joint. Otherwise enter the mass of
     the part. The file does not say which is right, so no edit removes the cause. The rule does not report
@@ -400,17 +414,22 @@ class MassBeyondSize(Rule):
     """DX519 mass-beyond-size: A body without shapes is far too heavy for the distances between its joints.
 
     A body without shapes has no size in the file. So the rule estimates a length: the largest distance from
-    the body's frame to its centres of mass and to the joints that it carries. If the length of a neighbour is
-    larger, the rule uses that one. The length is at least a fiftieth of the sum of such distances in the
-    whole robot. The rule reports a body of more than 1e7 kg per cube of this length. In example-robot-data no
-    body has more than 2e4 (an ankle of 0.6 kg between joints 3 cm apart), which is 500 times less. If all
-    meshes of a body are missing, it counts as a body without shapes. For bodies with shapes see DX517.
+    the body's frame to its centres of mass and to the joints that it carries. If the length of a neighbouring
+    body is larger, the rule uses the larger length. The length is at least a fiftieth of the sum of such
+    distances in the whole robot.
 
-    Usual causes: a mass is in grams, or has an extra digit. Or an exporter computed the mass from a mesh in
-    millimetres: a finger of 56 g then gets 56 tonnes.
+    The rule reports a body whose mass, divided by the cube of this length, is above 1e7 kg/m^3. In
+    example-robot-data no body has more than 2e4 kg/m^3 (an ankle of 0.6 kg between joints 3 cm apart), 500
+    times less. If all meshes of a body are missing, it counts as a body without shapes. For bodies with
+    shapes see DX517.
+
+    Usual causes:
+
+    - A mass is in grams, or has an extra digit.
+    - An exporter computed the mass from a mesh in millimetres. A finger of 56 g then gets 56 tonnes.
 
     All engines use the numbers unchanged. Such a body dominates the torques of all joints before it, and
-    PyBullet's inverse dynamics may refuse it (DX119).
+    PyBullet's inverse dynamics may refuse the robot (DX119).
 
     The file does not contain the true mass, so no edit removes the cause.
     """

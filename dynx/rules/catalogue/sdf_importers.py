@@ -36,14 +36,15 @@ class InertiaFromShapesOfSdf(CallingRule):
 
     - Drake 1.51 reads both.
     - PyBullet 3.2.7 (``loadSDF``) reads the mass and the pose of the inertial. It computes the moments from
-      the bounding box of the collision shapes; without shapes they are 0. No flag makes it read the moments
-      of the file.
+      the bounding box of the collision shapes. Without shapes the moments are 0. PyBullet has no flag to read
+      the moments of the file.
 
     The effect: every link has another inertia. In most robots the mass matrix is off by tens of per cent.
 
-    What to do: set the moments after loading, or convert the file to URDF (``dynx convert --to urdf``) and
-    load it with ``URDF_USE_INERTIA_FROM_FILE``. The file is correct, so ``dynx doctor --fix`` does not change
-    it. The doctor prints the call that sets the moments. This call cannot set products of inertia (DX712).
+    What to do: set the moments after loading. Or convert the file to URDF (``dynx convert --to urdf``), and
+    load this URDF file with ``URDF_USE_INERTIA_FROM_FILE``. The file is correct, so ``dynx doctor --fix``
+    does not change it. The doctor prints the call that sets the moments. This call cannot set products of
+    inertia (DX712).
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -91,7 +92,8 @@ class AxisWithoutLimit(EditingRule):
     - PyBullet 3.2.7 (``loadSDF``) refuses the file ("Cannot load SDF file") if the joint is revolute or
       prismatic. It accepts a continuous joint.
 
-    What to do: write a limit. In SDF the limit 1e16 means "no limit"; ``dynx doctor --fix`` writes it.
+    What to do: write a limit. In SDF the limit 1e16 means "no limit". ``dynx doctor --fix`` writes this
+    limit.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -148,20 +150,20 @@ class InertialWithoutInertia(EditingRule):
 class FramesOfSdf(Rule):
     """DX704 frames-of-sdf: A pose or an axis is stated in a frame that PyBullet does not read.
 
-    In SDF a pose may be relative to another frame (``relative_to``, ``<frame>``), in degrees, or a
-    quaternion. An axis may be in another frame (``expressed_in``, ``use_parent_model_frame``). A joint may
-    have an offset from its child (``<pose>``).
+    In SDF a pose may be relative to another frame (``relative_to``, ``<frame>``). Its angles may be in
+    degrees, or a quaternion. An axis may be in another frame (``expressed_in``, ``use_parent_model_frame``).
+    A joint may have an offset from its child (``<pose>``).
 
-    - Drake 1.51 reads all of these.
-    - PyBullet 3.2.7 (``loadSDF``) reads the pose of a link as six numbers in the frame of the model, and the
-      axis in the frame of the child. It ignores the attributes, and the pose of a joint. If a pose has no
-      numbers, PyBullet ends the process.
+    - Drake 1.51 reads all these poses and axes.
+    - PyBullet 3.2.7 (``loadSDF``) reads the pose of a link as six numbers in the frame of the model. It reads
+      an axis in the frame of the child. It ignores these attributes, and the pose of a joint. If a pose has
+      no numbers, PyBullet ends the process.
 
     The effect: the link has another pose, or the joint has another axis.
 
     What to do: convert the file to URDF for PyBullet (``dynx convert --to urdf``). ``dynx doctor --fix`` does
-    not change the file. So the report gives as the effect the difference that remains after all other causes
-    are removed.
+    not change the file. So the report measures the effect as the difference that remains after all other
+    causes are removed.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -230,8 +232,8 @@ class SpringOfSdf(Rule):
 
     What to do: decide whether torques include springs. The file is correct, so ``dynx doctor --fix`` does not
     change it. dynx reads springs, and its quantities include them with ``joint_dynamics=True``. The doctor
-    compares the rigid bodies alone. No call removes the force element from Drake. So the report gives as the
-    effect the difference that remains after all other causes are removed.
+    compares the rigid bodies alone. No call removes the force element from Drake. So the report measures the
+    effect as the difference that remains after all other causes are removed.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -350,17 +352,17 @@ class SeveralRootsOfSdf(Rule):
 class SharedNameOfSdf(EditingRule):
     """DX710 shared-name-of-sdf: Two parts of one model or link have the same name, so Drake refuses the file.
 
-    Within a model, the names of links, joints and frames must differ. Within a link, the names of collisions
-    must differ, and the names of visuals must differ. Older files violate this: a joint has the name of its
-    link, a joint is called ``world``, or two visuals are called ``visual``.
+    Within a model, all links, joints and frames must have different names. Within a link, all collisions must
+    have different names, and so must all visuals. Older files violate this: a joint has the name of its link,
+    a joint is called ``world``, or two visuals are called ``visual``.
 
     - Drake 1.51 refuses the file: "Non-unique name", "The supplied joint name [world] is reserved" or "visual
       with name[visual] already exists".
     - PyBullet 3.2.7 (``loadSDF``) loads the file.
 
-    What to do: give the second part another name. ``dynx doctor --fix`` renames joints and shapes, also in
-    mimic joints. If a program looks a joint up by its name, change the program, too. The rule does not
-    examine names of frames.
+    What to do: give the second part another name. ``dynx doctor --fix`` renames joints and shapes. It also
+    changes the names in mimic joints. If a program looks up a joint by its name, also change the program. The
+    rule does not examine names of frames.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -413,8 +415,8 @@ def _shapes_of_one_name(case: Case, link: SourceElement) -> Iterator[Correction]
 class ModelsInOtherFolders(CallingRule):
     """DX711 models-in-other-folders: The file includes a model by its name, which Drake does not search for.
 
-    ``model://arm`` is a folder ``arm``, or a folder whose ``model.config`` has this name. Gazebo searches for
-    it in the folders of ``GZ_SIM_RESOURCE_PATH``. dynx searches around the file and in ``package_dirs``.
+    ``model://arm`` means a folder ``arm``, or a folder whose ``model.config`` has this name. Gazebo searches
+    for the folder in ``GZ_SIM_RESOURCE_PATH``. dynx searches near the file and in ``package_dirs``.
 
     - Drake 1.51 searches only in the ``package_map`` of its parser. If the folder is not there, it refuses
       the file ("Unable to find uri"). Otherwise it reads ``model://arm/`` and ``model://arm/model.sdf``, but

@@ -29,7 +29,8 @@ class UnknownCollisionShape(EditingRule):
     The shapes of URDF are box, sphere, cylinder and mesh (and capsule in later versions). ``<plane>`` and
     ``<cdf>`` are extensions of PyBullet.
 
-    - MuJoCo 4.0 refuses the file ("visual geometry specification not found", also for a collision).
+    - MuJoCo 4.0 refuses the file. (Even for a collision the message is "visual geometry specification not
+      found".)
     - Pinocchio 4.1 drops the shape with a line on stderr. Drake 1.51 prints a warning or ignores the shape.
     - PyBullet 3.2.7 reads the shape.
 
@@ -122,16 +123,16 @@ class CollisionShapeWithoutSize(EditingRule):
     - PyBullet 3.2.7 accepts sizes of zero and negative sizes. If the attribute is missing, it refuses the
       file ("Cannot load URDF file").
     - MuJoCo and PyBullet refuse a ``<mesh>`` without ``filename``, or with an empty ``filename``.
-    - Drake 1.51 reads shapes only into a scene graph. Then a size that is not positive, also of a visual
-      shape, raises ``SystemExit``, which ends the program. Drake accepts a sphere of radius zero.
+    - Drake 1.51 reads shapes only into a scene graph. If a size of a collision or visual shape is then not
+      positive, Drake raises ``SystemExit``, which ends the program. Drake accepts a sphere of radius zero.
     - Pinocchio 4.1 reads no shapes into a model.
 
     If a link states its inertia, its dynamics does not depend on shapes. But some engines refuse the file.
 
     What to do: remove the shape, or write its size. ``dynx doctor --fix`` removes the sign of a negative
     size. If a size is zero or missing, it removes the ``<collision>``. ``--choose DX425=thicken`` writes 1e-6
-    m for each size of zero instead, which keeps the contacts of a plate. It still removes a shape if a size
-    or the file is missing. ``--choose DX425=keep`` keeps the file; MuJoCo then refuses it.
+    m for each size of zero instead, so a plate keeps its contacts. It still removes a shape if a size or the
+    file is missing. ``--choose DX425=keep`` keeps the file; MuJoCo then refuses it.
     """
 
     stage = "reading"
@@ -246,16 +247,17 @@ class MeshNotFound(Rule):
     """DX516 mesh-not-found: The file of a mesh, or of the texture of a visual, is not where the robot file
     says.
 
-    The rule reports a missing file only if dynx knows where it should be: a path relative to the robot file,
-    a ``file://`` path, or a path in a package that dynx found. dynx looks for packages in the folders above
-    the robot file, in ROS_PACKAGE_PATH and in AMENT_PREFIX_PATH. On a case-sensitive file system ``Base.STL``
-    is not ``base.stl``. dynx does not examine paths that leave the package or repository of the robot file.
+    The rule reports a missing file only if dynx knows where it should be. dynx knows this for a path relative
+    to the robot file, a ``file://`` path, and a path in a package that dynx found. dynx looks for packages in
+    the folders above the robot file, in ROS_PACKAGE_PATH and in AMENT_PREFIX_PATH. On a case-sensitive file
+    system ``Base.STL`` is not ``base.stl``. dynx does not examine paths that leave the package or repository
+    of the robot file.
 
     - PyBullet 3.2.7 refuses the robot file ("Cannot load URDF file") if a mesh in ``<visual>`` or
-      ``<collision>`` is missing. It reads every path, also ``/meshes/a.stl``, as relative to the folder of
-      the robot file and to each folder above it. It also searches folders of its own
-      (``setAdditionalSearchPath``). So it may find meshes that other engines do not find. The message names
-      the file that PyBullet finds in the package or repository.
+      ``<collision>`` is missing. It searches for every path, even ``/meshes/a.stl``, in the folder of the
+      robot file and in each folder above. It also searches folders of its own (``setAdditionalSearchPath``).
+      So it may find meshes that other engines do not find. The message of this rule names the file that
+      PyBullet finds in the package or repository.
     - Drake 1.51 refuses the robot file only with a scene graph. It then also needs the textures in
       ``<visual>``.
     - MuJoCo 4.0 refuses the robot file if a mesh in ``<collision>`` is missing. It ignores visual shapes.

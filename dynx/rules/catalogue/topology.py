@@ -23,20 +23,21 @@ class JointOfSeveralFreedoms(EditingRule):
 
     - ``spherical``: Pinocchio 4.1 and Drake 1.51 refuse the file. PyBullet 3.2.7 reads it, but mass matrix
       and inverse dynamics fail, or have other coordinates than the state of the joint. MuJoCo 4.0 reads the
-      joint with a quaternion, but refuses the usual limits of such a joint. No engine reads ``ball``.
-    - ``planar``: Pinocchio has the coordinates (x, y, cos, sin). MuJoCo and Drake have three joints or
+      joint with a quaternion, but refuses the usual limits of such a joint.
+    - ``ball``: no engine reads this type.
+    - ``planar``: Pinocchio uses the coordinates (x, y, cos, sin). MuJoCo and Drake use three joints or
       coordinates. PyBullet moves the joint, but has no dynamics for it.
-    - ``floating`` in the middle of a tree: Pinocchio has a quaternion. PyBullet makes the joint fixed, and
+    - ``floating`` in the middle of a tree: Pinocchio uses a quaternion. PyBullet makes the joint fixed, and
       prints one line on stdout. MuJoCo and Drake refuse the file, or leave the link free in the world.
 
     dynx refuses such a joint in URDF.
 
     What to do: write joints of one degree of freedom each, with massless links between them.
-    ``dynx doctor --fix`` writes three rotations for a spherical joint, two translations and a rotation for a
-    planar joint, and three translations and three rotations for a floating joint. The chain has the same
-    motion. Its coordinates are angles, which are singular if the middle angle is 90 degrees. The limits of
-    the joint are dropped. MuJoCo refuses massless links that move (DX110), so the links in between have 2e-15
-    kg. ``--choose DX210=fixed`` makes the joint fixed instead.
+    ``dynx doctor --fix`` replaces the joint by such a chain. A spherical joint becomes three rotations, a
+    planar joint becomes two translations and a rotation, and a floating joint becomes three translations and
+    three rotations. The chain has the same motion. Three rotations are singular if the middle angle is 90
+    degrees. The chain has no limits. MuJoCo refuses massless links that move (DX110), so the links in between
+    have 2e-15 kg. ``--choose DX210=fixed`` makes the joint fixed instead.
     """
 
     stage = "reading"
@@ -66,7 +67,7 @@ class FloatingJointAtRoot(EditingRule):
     file.
 
     Some files describe a floating robot in this way: the root is a link ``world`` without inertia, and a
-    joint of type ``floating`` connects the robot to it. Then both the file and the call that loads it state
+    joint of type ``floating`` connects the robot to this link. But the call that loads a file also states
     whether the base floats.
 
     - PyBullet 3.2.7 makes the joint fixed, and prints one line on stdout. Then ``useFixedBase`` decides.
@@ -75,11 +76,11 @@ class FloatingJointAtRoot(EditingRule):
     - MuJoCo 4.0 makes it a free joint.
     - Drake 1.51 does not support the type. It leaves the child free in the world, with a quaternion of zeros.
 
-    dynx reads the joint as fixed; the argument ``base`` decides.
+    dynx reads the joint as fixed. In dynx only the argument ``base`` says whether the base floats.
 
-    What to do: specify the base only in the call. ``dynx doctor --fix`` makes the joint fixed. An engine that
-    takes the floating base from the file then fixes the robot to the world, unless the call says otherwise.
-    So this counts as a change of the physics (``--level physics``).
+    What to do: specify the base only in the call. ``dynx doctor --fix`` makes the joint fixed. Some engines
+    took the floating base from the file. They then fix the robot to the world, unless the call says
+    otherwise. So this remedy counts as a change of the physics (``--level physics``).
     """
 
     # Before the rules about inertia, which may give the empty root a body.
@@ -101,18 +102,18 @@ class TooManyJoints(Rule):
     """DX212 too-many-joints: The robot has more joints than PyBullet supports.
 
     PyBullet 3.2.7 supports 127 joints, including fixed joints. For further joints ``getJointState`` and
-    ``getLinkState`` fail, so there are no positions. Above 128 coordinates, ``calculateInverseDynamics``,
-    ``calculateMassMatrix`` and ``calculateJacobian`` return wrong results without a warning (an error of 20 %
-    at 129 coordinates). Hands with sensors and robots with many named frames exceed this number:
-    ``tiago_dual`` of example-robot-data has 129 joints.
+    ``getLinkState`` fail, so PyBullet does not return their positions. Above 128 coordinates,
+    ``calculateInverseDynamics``, ``calculateMassMatrix`` and ``calculateJacobian`` return wrong results
+    without a warning (an error of 20 % at 129 coordinates). Hands with sensors, and robots with many named
+    frames, may have too many joints. For example, ``tiago_dual`` of example-robot-data has 129 joints.
 
     Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 have no such limit.
 
     What to do: drop frames that PyBullet does not need. Here a frame is a link at the end of a chain, without
-    mass, on a fixed joint. ``dynx doctor --fix`` removes frames until 127 joints remain. It first removes
-    frames without shapes, and begins at the end of the file. The dynamics does not change. Programs that use
-    these frames need the original file. ``--choose DX212=keep`` keeps the frames, and PyBullet cannot load
-    the robot. If the file has too few such frames, or more than 127 joints move, there is no remedy.
+    mass, on a fixed joint. ``dynx doctor --fix`` removes frames until 127 joints remain. It begins with
+    frames without shapes, and at the end of the file. The dynamics does not change. Programs that use these
+    frames need the original file. ``--choose DX212=keep`` keeps the frames, and PyBullet cannot load the
+    robot. If the file has too few such frames, or more than 127 joints move, there is no remedy.
     """
 
     advice = "Remove links that are only frames from the file for PyBullet."
@@ -250,8 +251,8 @@ class WorldNotDeclared(EditingRule):
 class SeveralRootLinks(EditingRule):
     """DX223 several-root-links: A link is not the child of a joint, and is not the root of the robot.
 
-    A robot in URDF is one tree. If the joint of a link was forgotten or commented out, or a table was added
-    to the file, the file has a second tree.
+    A robot in URDF is one tree. The file has a second tree if the joint of a link was forgotten or commented
+    out, or if someone added a table to the file.
 
     - Pinocchio 4.1 refuses the file ("two root links found"). PyBullet 3.2.7 ends the process with a crash.
     - MuJoCo 4.0 fixes every such link to its world, at the origin.
@@ -261,8 +262,8 @@ class SeveralRootLinks(EditingRule):
 
     What to do: add the joint, or write two files. The file does not say where the link belongs, so
     ``dynx doctor --fix`` attaches it to the root by a fixed joint without offset, as MuJoCo does.
-    ``--choose DX223=remove`` removes the smaller trees instead. In both cases the tree with the most links
-    keeps its root. If several trees have this number of links, it is the first of them.
+    ``--choose DX223=remove`` removes the smaller trees instead. In both cases the tree with the most links is
+    the robot. If several trees have the same number of links, the first of them is the robot.
     """
 
     stage = "reading"
@@ -340,8 +341,8 @@ class JointOfDrake(EditingRule):
 
     - Drake 1.51.1 adds the joint. If another joint already has the same child link, it refuses the file
       ("form one or more loops").
-    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore the element, and dynx ignores it with a note.
-      Without another joint, the child link is then the root of a second tree (DX223).
+    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore the element, and dynx ignores it with a note. If no
+      other joint has this child link, the link is then the root of a second tree (DX223).
 
     What to do: write a chain of URDF joints with small links between them (see DX210), or use the file with
     Drake alone. ``dynx doctor --fix`` removes the element, because a chain cannot replace every type, such as

@@ -15,8 +15,9 @@ class TransmissionOfNothing(EditingRule):
 
     Transmissions belong to ROS and its controllers. Of the engines only Drake reads them:
 
-    - Drake 1.51 refuses the file if a transmission has no type, no ``<joint>`` or no ``<actuator>`` with a
-      name, or names a joint that the file does not have. It ignores types other than ``SimpleTransmission``.
+    - Drake 1.51 refuses the file if a transmission has no type, no named ``<joint>`` or no named
+      ``<actuator>``. It also refuses a transmission of a joint that the file does not have. It ignores types
+      other than ``SimpleTransmission``.
     - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore transmissions.
 
     What to do: if ROS controllers use the transmission, complete it; otherwise remove it.

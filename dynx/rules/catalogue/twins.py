@@ -59,51 +59,60 @@ class TwinsDiffer(Rule):
     """DX521 twins-differ: A left and a right link differ in mass, inertia, centre of mass, distance of the
     joint, or limits.
 
-    *Twins* are links whose names differ only in words such as ``left`` and ``right``, ``L`` and ``R``, ``FL``
-    and ``FR``, and whose joints have the same type. The rule compares the following numbers of twins.
+    *Twins* are two links with joints of the same type. Their names differ only in words such as ``left`` and
+    ``right``, ``L`` and ``R``, ``FL`` and ``FR``. The rule compares four kinds of numbers of twins.
 
-    Mass, principal moments, and the distance of the centre of mass from the joint: they do not depend on the
-    side or on the choice of link frames. The rule compares them if both joints have the same distance from
-    their parents (to 1 %). It reports masses or moments that differ by more than 10 %, and distances that
-    differ by more than 10 % and 5 mm.
+    **Mass, principal moments, and the distance of the centre of mass from the joint.** These numbers do not
+    depend on the side or on the choice of link frames. The rule compares them if both joints have the same
+    distance from their parents (to 1 %). It reports masses or moments that differ by more than 10 %. It
+    reports distances that differ by more than 10 % and by more than 5 mm.
 
-    Distances of the joints from their parents: the rule compares them if the joints rotate, the parents are
-    one link or twins by name, and masses (to 1 %), moments and centres of mass are alike. It reports
-    distances that differ by more than 1 % and 1 mm. There is one exception: the twins lie about one plane,
-    and this plane contains the centre of mass of the parent but not the origin of the parent's frame.
+    **Distances of the joints from their parents.** The rule compares them under three conditions: the joints
+    rotate, the parents are one link or twins by name, and masses (to 1 %), moments and centres of mass are
+    alike. It reports distances that differ by more than 1 % and by more than 1 mm. There is one exception:
+    the twins lie about one plane, and this plane contains the centre of mass of the parent but not the origin
+    of the parent's frame.
 
-    Limits: the rule reports limits of effort and velocity, and widths of ranges, that differ by more than 1
-    %, and widths only if they also differ by more than 0.01 rad or m. It leaves out mimic joints.
+    **Limits.** The rule reports limits of effort and velocity that differ by more than 1 %. It reports ranges
+    whose widths differ by more than 1 % and by more than 0.01 rad or m. It leaves out mimic joints.
 
-    Numbers with a sign, such as products of inertia: the rule reflects one twin at the plane between the
-    twins, and compares the numbers in the axes of the root, with every joint at zero. This requires that
-    positions and axes of their joints, and of their children's joints, are reflections (to 1 mm and 1 %).
-    Together with the centre of mass they must show how a link is rotated about its joint. Otherwise the rule
-    does not compare these numbers.
+    **Numbers with a sign**, such as products of inertia. The rule reflects one twin at the plane between the
+    twins, and compares the numbers in the axes of the root, with every joint at zero. This requires that the
+    joints of the twins, and the joints of their children, are reflections of each other (to 1 mm and 1 %).
+    These joints and the centre of mass must also show how each link is rotated about its joint. Otherwise the
+    rule does not compare these numbers.
 
     - Products of inertia: the rule reports a difference of more than 5 % of the largest moment. The same part
       may be on both sides, or it may be rotated by half a turn. So the rule accepts the signs of any
       reflection or half turn along these axes that agrees with the centres of mass. If the products of
       inertia are reflections and the centres of mass are not, it reports the centres of mass.
-    - The range of a joint: the rule reports limits that differ by more than 1 % and 0.01 rad or m. The axes
-      of the joints determine the expected range. For example, hips that pitch about y on both sides must have
-      equal ranges. For hips that roll about x, the lower limit of one must be minus the upper limit of the
-      other.
+    - The range of a joint: the rule reports limits that differ by more than 1 % and by more than 0.01 rad or
+      m. The axes of the joints determine the expected range. For example, hips that pitch about y on both
+      sides must have equal ranges. For hips that roll about x, the lower limit of one must be minus the upper
+      limit of the other.
 
-    The rule reports 15 of the 69 files of example-robot-data. In six files, the moments of forearms or arms
-    differ or are exchanged. In two, the moments of one leg are zero. In four, limits of effort or velocity
-    differ, such as 150 N m on the left and 1000 N m on the right. In four, the products of inertia of an
-    upper arm were copied without a change of sign. In two, the roll joint of both ankles has the range of a
-    pitch joint. The rule reports nine of more than 1,000 files of pybullet_data.
+    The rule reports 15 of the 69 files of example-robot-data. A file may have several of these causes:
 
-    Usual causes: only one side was measured or exported again. Or a number has an extra digit, or moments are
-    in another unit. Or a sign of a product of inertia was lost when the file was reflected. Or limits were
-    copied without exchanging lower and upper.
+    - In six files the moments of forearms or arms differ or are exchanged.
+    - In two files the moments of one leg are zero.
+    - In four files limits of effort or velocity differ, such as 150 N m on the left and 1000 N m on the
+      right.
+    - In four files the products of inertia of an upper arm were copied without a change of sign.
+    - In two files the roll joint of both ankles has the range of a pitch joint.
+
+    The rule reports nine of more than 1,000 files of pybullet_data.
+
+    Usual causes:
+
+    - Only one side was measured or exported again.
+    - A number has an extra digit, or moments are in another unit.
+    - A sign of a product of inertia was lost when the file was reflected.
+    - Limits were copied, but lower and upper were not exchanged.
 
     All engines use the numbers unchanged. The robot leans to one side, and a gait that was tuned on one leg
-    fails on the other. If the two parts really differ, such as a tool in one hand, nothing is wrong.
+    fails on the other leg. If the two parts really differ, such as a tool in one hand, nothing is wrong.
 
-    The file does not say which of the two is right, so no edit removes the cause.
+    The file does not say which of the two links is right, so no edit removes the cause.
     """
 
     kind = "practice"
