@@ -31,12 +31,13 @@ file that shows the cause. `dynx explain DX101` prints the text of a rule.
 Words on this page:
 
 - Two links are *rigidly connected* if all joints between them are fixed.
-- The *principal moments* are the eigenvalues of an inertia tensor. A tensor that *a body can have* has no
-  negative principal moment, and none above the sum of the other two.
+- The *principal moments* are the eigenvalues of an inertia tensor. In a tensor that *a body can have*, no
+  principal moment is negative, and none exceeds the sum of the other two.
 - The *largest double* is 1.7976931348623157e+308. dynx reads a limit of this size as "no limit".
 - A *unit in the last place* is the distance from a number to the next double, about 1e-16 of the number.
 - *Off by 1 %* means an error of 1 % of the largest entry of the right result.
-- A line with `--choose` is an alternative remedy of `dynx doctor --fix`. The first one is the default.
+- `dynx doctor --fix` writes a repaired copy of the file. Each rule describes its *remedy*.
+- Some rules have several remedies, in lines with `--choose`. The first remedy is the default.
 """
 
 GROUPS = {

@@ -46,7 +46,7 @@ class RobotInMillimetres(Rule):
     bodies, including meshes. It reports the robot if there are at least two lengths, the median of each kind
     is 5 m or more, and the robot is light for its size. *Light* means a mass below 1e-5 kg/m^3 times the cube
     of the sum of all lengths. If the robot has no mass, the shapes must be 20 m or more. So this rule does
-    not report a robot in which only a mesh lacks its scale (DX517 does).
+    not report a robot in which only a mesh lacks its scale. For such a mesh, see DX517.
 
     Usual causes: a program exported the unit of the drawing, or someone copied lengths from a data sheet.
 

@@ -158,7 +158,7 @@ class AxisAttributeMisspelled(EditingRule):
     that moves, and names the attribute.
 
     What to do: correct the name. ``dynx doctor --fix`` corrects it if the attribute holds three numbers that
-    are not all zero. An axis without any numbers is DX202, or DX219 on a fixed joint.
+    are not all zero. For an axis without any numbers, see DX202 (DX219 if the joint is fixed).
     """
 
     stage = "reading"
@@ -188,7 +188,7 @@ class UnreadableAxisOfFixedJoint(EditingRule):
       format in attribute 'xyz'").
     - Pinocchio 4.1, PyBullet 3.2.7, Drake 1.51 and dynx ignore the axis.
 
-    A direction under another name, such as ``<axis xzy="0 0 1"/>``, is DX218.
+    For a direction under another name, such as ``<axis xzy="0 0 1"/>``, see DX218.
 
     What to do: remove the ``<axis>``, as ``dynx doctor --fix`` does.
     """

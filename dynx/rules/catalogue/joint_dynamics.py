@@ -47,9 +47,9 @@ class DampingInInverseDynamics(CallingRule):
     most of the torque.
 
     What to do: decide whether torques include damping. Then add ``damping * v`` to Pinocchio's torque, or
-    switch damping off in the other engines. The file is correct, so ``dynx doctor --fix`` does not change it.
-    dynx returns the torque of the rigid bodies alone, unless you write ``joint_dynamics=True``. The doctor
-    compares this torque, and prints the calls that switch damping off in each engine.
+    switch damping off in the other engines. The file is correct, so ``dynx doctor --fix`` does not change the
+    file. dynx returns the torque of the rigid bodies alone, unless you write ``joint_dynamics=True``. The
+    doctor compares this torque, and prints the calls that switch damping off in each engine.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf", "sdf")
@@ -83,7 +83,7 @@ class FrictionInInverseDynamics(CallingRule):
     The effect is as large as the friction: a few per cent of the torque for an arm with gears.
 
     What to do: decide whether torques include friction. The file is correct, so ``dynx doctor --fix`` does
-    not change it. dynx returns the torque of the rigid bodies alone, unless you write
+    not change the file. dynx returns the torque of the rigid bodies alone, unless you write
     ``joint_dynamics=True``. The doctor compares this torque, and prints the call that switches friction off
     in MuJoCo.
     """
@@ -152,7 +152,7 @@ class MimicAsConstraint(CallingRule):
 
     What to do: find out how your engine reads mimic joints. The doctor compares all engines with free mimic
     joints, and prints the calls that switch the constraints off. The file is correct, so
-    ``dynx doctor --fix`` does not change it.
+    ``dynx doctor --fix`` does not change the file.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "sdf")
@@ -227,8 +227,8 @@ class LimitsAsForces(CallingRule):
     limits.
 
     What to do: write the range of the joint, or ``type="fixed"`` (see DX508). The file does not say which of
-    the two is right, so ``dynx doctor --fix`` does not change it. The doctor prints the calls that switch
-    limits off.
+    the two is right, so ``dynx doctor --fix`` does not change the file. The doctor prints the calls that
+    switch limits off.
     """
 
     advice = "Write the range of the joint, or switch its limits off."
@@ -265,8 +265,8 @@ class RotorInertia(CallingRule):
 
     What to do: decide whether your robot model includes the rotors. For the armature, Pinocchio has
     ``model.armature``, MuJoCo has ``dof_armature``, and dynx reads ``<dynamics armature="...">``. The file is
-    correct, so ``dynx doctor --fix`` does not change it. The doctor compares without rotors, and prints the
-    call that switches them off in Drake.
+    correct, so ``dynx doctor --fix`` does not change the file. The doctor compares without rotors, and prints
+    the call that switches them off in Drake.
     """
 
     advice = "Decide whether rotors belong to the robot, and configure each engine accordingly."
@@ -303,8 +303,8 @@ class ContactsAsForces(CallingRule):
     and mimic joints follow their leading joints. The report names the links that touch.
 
     What to do: find out whether your torques include contacts. The file is correct, so ``dynx doctor --fix``
-    does not change it. The doctor compares without contacts, and prints the call that switches them off in
-    MuJoCo.
+    does not change the file. The doctor compares without contacts, and prints the call that switches them off
+    in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")

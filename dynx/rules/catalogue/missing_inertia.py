@@ -135,7 +135,7 @@ class MasslessRoot(Rule):
     connected to the root. This link gets a zero inertia, and keeps its name and its place. The equations of
     motion are the same. If no link rigidly connected to the root has mass, the root gets 2e-15 kg and 1.5e-14
     kg m^2. All engines accept these numbers, which are too small to show in any result.
-    ``--choose DX107=keep`` leaves the root unchanged. A robot in which no link has mass is DX118.
+    ``--choose DX107=keep`` leaves the root unchanged. If no link of the robot has mass, see DX118.
     """
 
     engines = measured_on("pybullet")

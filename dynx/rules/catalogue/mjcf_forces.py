@@ -29,9 +29,9 @@ class ArmatureInMassMatrix(CallingRule):
     links. A controller that was tuned with armature can be unstable without it.
 
     What to do: decide whether your robot model includes the rotors, and set the armature in each engine. The
-    file is correct, so ``dynx doctor --fix`` does not change it. dynx reads the armature, and its quantities
-    include it with ``joint_dynamics=True``. The doctor compares the rigid bodies alone, and prints the calls
-    that remove the armature from each engine.
+    file is correct, so ``dynx doctor --fix`` does not change the file. dynx reads the armature, and its
+    quantities include it with ``joint_dynamics=True``. The doctor compares the rigid bodies alone, and prints
+    the calls that remove the armature from each engine.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf", "sdf")
@@ -64,7 +64,7 @@ class SpringInInverseDynamics(CallingRule):
     MuJoCo falls in the other engines.
 
     What to do: if an engine drops the spring, add its force to your controller. The file is correct, so
-    ``dynx doctor --fix`` does not change it. dynx reads the spring, and its quantities include it with
+    ``dynx doctor --fix`` does not change the file. dynx reads the spring, and its quantities include it with
     ``joint_dynamics=True``. The doctor compares the rigid bodies alone, and prints the call that switches
     springs off in MuJoCo.
     """
@@ -99,7 +99,7 @@ class GravityCompensation(CallingRule):
     The effect is the share of the weight that MuJoCo cancels, in most arms all of it.
 
     What to do: compensate the weight by your controller, with the gravity torque of the model. The file is
-    correct, so ``dynx doctor --fix`` does not change it. dynx ignores the attribute, with a note in
+    correct, so ``dynx doctor --fix`` does not change the file. dynx ignores the attribute, with a note in
     ``model.notes``. The doctor prints the call that switches the compensation off in MuJoCo.
     """
 
@@ -134,8 +134,8 @@ class TendonForces(CallingRule):
     MuJoCo.
 
     What to do: if an engine drops tendons, add their forces to your controller. The file is correct, so
-    ``dynx doctor --fix`` does not change it. dynx ignores tendons, with a note in ``model.notes``. The doctor
-    prints the call that switches the forces of tendons off in MuJoCo.
+    ``dynx doctor --fix`` does not change the file. dynx ignores tendons, with a note in ``model.notes``. The
+    doctor prints the call that switches the forces of tendons off in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -164,13 +164,14 @@ class ActuatorForces(CallingRule):
     - MuJoCo 4.0 adds the force of the actuator to forward dynamics, even if your program never sets
       ``data.ctrl``. ``mj_inverse`` does not subtract it.
     - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) drop actuators. Drake 1.51 adds
-      an actuator without a controller.
+      the actuator to the plant, but no controller that commands it.
 
     The effect is the force of the actuator. For ``position`` it is the gain times the distance from 0. So the
     actuators hold the robot in MuJoCo, and the robot falls in the other engines.
 
     What to do: write the gains into your controller. The file is correct, so ``dynx doctor --fix`` does not
-    change it. The doctor compares without actuators, and prints the call that switches them off in MuJoCo.
+    change the file. The doctor compares without actuators, and prints the call that switches them off in
+    MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -207,8 +208,8 @@ class EqualityAsConstraint(CallingRule):
     The effect is large in robots with closed loops, such as Cassie.
 
     What to do: close the loops in each engine by the constraints of this engine. The file is correct, so
-    ``dynx doctor --fix`` does not change it. The doctor compares the open tree, and prints the calls that
-    switch the constraints off.
+    ``dynx doctor --fix`` does not change the file. The doctor compares the open tree, and prints the calls
+    that switch the constraints off.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
@@ -240,8 +241,8 @@ class FluidForces(CallingRule):
     medium.
 
     What to do: leave the medium out for robots on land. The file is correct, so ``dynx doctor --fix`` does
-    not change it. dynx ignores the medium, with a note in ``model.notes``. The doctor compares without a
-    medium, and prints the call that switches it off in MuJoCo.
+    not change the file. dynx ignores the medium, with a note in ``model.notes``. The doctor compares without
+    a medium, and prints the call that switches it off in MuJoCo.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)

@@ -509,7 +509,8 @@ class InertiaFromShapesOfMjcf(CallingRule):
 
     What to do: set the masses and the moments after loading. Or convert the file to URDF
     (``dynx convert --to urdf``), and load this URDF file with the flag. The file is correct, so
-    ``dynx doctor --fix`` does not change it. The doctor prints the call that sets the masses and the moments.
+    ``dynx doctor --fix`` does not change the file. The doctor prints the call that sets the masses and the
+    moments.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)

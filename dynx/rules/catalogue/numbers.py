@@ -297,8 +297,8 @@ class AttributeWithoutNumber(MisspelledNumberRule):
       words, and an empty mass or moment.
 
     dynx refuses the file and names the line, unless dynx does not need the element. For example, it does not
-    need the limits of a fixed joint. An empty ``xyz`` or ``rpy`` is DX408, and an infinite limit is DX407.
-    dynx does not correct an expression of xacro, such as ``${mass}``: expand the file with ``xacro``.
+    need the limits of a fixed joint. For an empty ``xyz`` or ``rpy``, see DX408, and for an infinite limit
+    DX407. dynx does not correct an expression of xacro, such as ``${mass}``: expand the file with ``xacro``.
 
     What to do: write the numbers. The file does not contain the missing numbers, so ``dynx doctor --fix``
     leaves the attributes as they are and lists each with its line. It removes only empty attributes that have

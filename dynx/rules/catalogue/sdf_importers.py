@@ -43,8 +43,8 @@ class InertiaFromShapesOfSdf(CallingRule):
 
     What to do: set the moments after loading. Or convert the file to URDF (``dynx convert --to urdf``), and
     load this URDF file with ``URDF_USE_INERTIA_FROM_FILE``. The file is correct, so ``dynx doctor --fix``
-    does not change it. The doctor prints the call that sets the moments. This call cannot set products of
-    inertia (DX712).
+    does not change the file. The doctor prints the call that sets the moments. This call cannot set products
+    of inertia (DX712).
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -231,9 +231,9 @@ class SpringOfSdf(Rule):
     The effect is the stiffness times the distance from the reference.
 
     What to do: decide whether torques include springs. The file is correct, so ``dynx doctor --fix`` does not
-    change it. dynx reads springs, and its quantities include them with ``joint_dynamics=True``. The doctor
-    compares the rigid bodies alone. No call removes the force element from Drake. So the report measures the
-    effect as the difference that remains after all other causes are removed.
+    change the file. dynx reads springs, and its quantities include them with ``joint_dynamics=True``. The
+    doctor compares the rigid bodies alone. No call removes the force element from Drake. So the report
+    measures the effect as the difference that remains after all other causes are removed.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)

@@ -71,7 +71,7 @@ class ShapeWithoutGeometry(EditingRule):
     - Pinocchio 4.1 drops the shape with a line on stderr. Drake 1.51 prints a warning or ignores the shape.
 
     If a link states its inertia, its dynamics does not depend on shapes. But some engines refuse the file.
-    The shapes ``<plane>`` and ``<cdf>``, which only PyBullet reads, are DX417.
+    For the shapes ``<plane>`` and ``<cdf>``, which only PyBullet reads, see DX417.
 
     What to do: remove the element, or write its geometry. ``dynx doctor --fix`` removes the element.
     ``--choose DX424=keep`` keeps it; engines then refuse the file.
@@ -207,8 +207,8 @@ class VisualIncomplete(EditingRule):
       not have enough data"), and a ``<material>`` with neither name nor colour.
     - Pinocchio 4.1 and Drake 1.51 load the robot, because they read no visuals into a model without geometry.
 
-    For a collision without its size see DX425, for a material directly in ``<robot>`` DX427, and for a second
-    material DX411.
+    Three other rules are similar: DX425 (a collision without its size), DX427 (a material directly in
+    ``<robot>``) and DX411 (a second material).
 
     What to do: complete the visual. ``dynx doctor --fix`` removes a visual with an incomplete shape, and
     gives an incomplete material a name or a grey colour. ``--choose DX428=keep`` keeps the file as it is;
@@ -263,8 +263,8 @@ class MeshNotFound(Rule):
     - MuJoCo 4.0 refuses the robot file if a mesh in ``<collision>`` is missing. It ignores visual shapes.
     - Pinocchio's ``buildModelFromUrdf`` reads no mesh. Its ``buildGeomFromUrdf`` raises an error.
 
-    A missing texture in a material directly in ``<robot>`` is DX426. The dynamics does not depend on shapes,
-    and dynx reads the file without them.
+    For a missing texture in a material directly in ``<robot>``, see DX426. The dynamics does not depend on
+    shapes, and dynx reads the file without them.
 
     dynx does not know which file the author meant, so no edit removes the cause. The message gives the
     nearest name.
