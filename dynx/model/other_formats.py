@@ -14,7 +14,8 @@ _INCLUDED = "a part that a file of MJCF includes; dynx.load reads the file with 
 BY_ROOT = {
     "mujocoinclude": _INCLUDED,
     "sdf": _SDF,
-    "gazebo": "SDF of a version before 1.3; dynx reads versions 1.4 to 1.12, whose root is <sdf>",
+    "gazebo": "SDF of a version before 1.3 (dynx reads 1.4 to 1.12, whose root is <sdf>), or settings for "
+    "Gazebo that a URDF includes",
     "world": "a part of SDF, whose root is <sdf>",
     "mujoco": _MJCF,
     "COLLADA": _MESH,

@@ -95,7 +95,8 @@ def test_a_stated_omission_is_that_of_the_trap(rule: Any) -> None:
             '<body name="upper">', '<body name="upper"><joint name="shoulder" axis="0 1 0" type="hinge"/>'
         )
     elif rule.id == "DX615":
-        text = text.replace("<geom", '<body name="plinth"><geom').replace("/>", "/></body>")
+        plinth = '<geom type="box" size="1 1 1"/><body name="plinth"/>'
+        text = text.replace("<worldbody>", f"<worldbody>{plinth}")
     elif rule.id == "DX612":
         text = text.replace(WITHOUT_CAUSE[rule.id], 'pos="0.625 0 0"')
     else:

@@ -38,6 +38,7 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
     },
     "DX611": {"DX610": "the moments of no box are those of the file"},
     "DX613": {"DX610": "a body of another file is not looked at for a box"},
+    "DX620": {"DX308": "the shapes that touch are those of a robot"},
     "DX618": {"DX619": "the base that is fixed floats in PyBullet"},
     "DX708": {"DX711": "what is included is named by a model"},
     "DX711": {"DX708": "a file is included"},

@@ -68,6 +68,9 @@ CALLS: Mapping[str, str] = {
         "for j in range(p.getNumJoints(robot)): "
         "p.changeDynamics(robot, j, jointLowerLimit=-1e300, jointUpperLimit=1e300)"
     ),
+    "pybullet.no_contacts": (
+        "for k in range(-1, p.getNumJoints(robot)): p.setCollisionFilterGroupMask(robot, k, 0, 0)"
+    ),
     "pybullet.extrapolate_inertias": (
         "# load it into two clients; s is larger than any |moment|; k = 1 in the first, 2 in the second\n"
         "p.changeDynamics(robot, link, localInertiaDiagonal=[ixx + k * s, iyy + k * s, izz + k * s])\n"
@@ -95,6 +98,12 @@ def disable_simulation_settings(client: LoadedClient) -> None:
     """Switch off motors, damping of links and the limit of speeds, which do not come from the file."""
     client.disable_damping()
     client.release_motors()
+
+
+def disable_contacts(client: LoadedClient) -> None:
+    """Let no link of the robot touch anything."""
+    for k in (ROOT, *client.links):
+        client.call(client.engine.setCollisionFilterGroupMask, client.body, k, 0, 0)
 
 
 def set_joints(joints: Mapping[str, int], calls: Collection[str]) -> Setting:
@@ -213,6 +222,9 @@ def _joint(engine: Any, info: Any, T_parent_com: Floats, T_child_com: Floats) ->
     )
 
 
+_UNNAMED = "anonymous"
+"""Bullet's name of a body of MJCF that the file gives none, as of a floor."""
+
 _FUNCTIONS: Mapping[Format, str] = {"urdf": "loadURDF", "mjcf": "loadMJCF", "sdf": "loadSDF"}
 """PyBullet's function for each format."""
 
@@ -241,7 +253,7 @@ class LoadedPyBullet(LoadedRobot):
             "fixed": fixed,
             "flags": flags,
             "function": _FUNCTIONS[self._form],
-            "joints": () if self._form == "urdf" else model.joint_names,
+            "parts": () if self._form == "urdf" else (model.root, *model.joint_names),
         }
         self._clients = [LoadedClient(engine, path, model.name, **reading)]
         try:
@@ -289,6 +301,8 @@ class LoadedPyBullet(LoadedRobot):
         if "pybullet.set_inertias" in calls:
             client.apply(set_inertias(self._model, self._links, restored=self._form == "urdf"))
         client.apply(set_joints({_text(client.joints[k][1]): k for k in client.moving}, calls))
+        if "pybullet.no_contacts" in calls:
+            client.apply(disable_contacts)
 
     @classmethod
     def _flags(cls, calls: Collection[str]) -> tuple[str, ...]:
@@ -450,6 +464,29 @@ class LoadedPyBullet(LoadedRobot):
             return a
         # At rest and without gravity the rounding errors are relative to what is missed.
         return a + self._floating_acceleration(q, np.zeros_like(v), missed, [0.0, 0.0, 0.0])
+
+    def contacts(self, q: Floats) -> Mapping[tuple[str, str], float]:
+        """Pairs of `getContactPoints`, each shape by its link, or by the body that is not the robot.
+
+        They act on forward dynamics alone. The base stands where it is for all quantities, at the origin.
+        """
+        client, engine = self._client, self._client.engine
+        client.reset_joints(self._joints(q))
+        client.call(engine.performCollisionDetection)
+        links = {number: name for name, number in self._links.items()}
+
+        def name(body: int, link: int) -> str:
+            if body == client.body:
+                return links.get(link, self._model.root)
+            of_body = _text(client.call(engine.getBodyInfo, body)[0])
+            return "the world" if of_body == _UNNAMED else of_body
+
+        found: dict[tuple[str, str], float] = {}
+        for point in client.call(engine.getContactPoints, client.body):
+            if (depth := -float(point[8])) >= 0.0:
+                one, other = sorted((name(point[1], point[3]), name(point[2], point[4])))
+                found[one, other] = max(found.get((one, other), 0.0), depth)
+        return found
 
     def _floating_acceleration(self, q: Floats, v: Floats, tau: Floats, gravity: list[float]) -> Floats:
         """Return the change of the velocity of a robot with a floating base in one step of unit length."""

@@ -454,15 +454,15 @@ class LoadedClient(RobotClient):
         fixed: bool,
         flags: Iterable[str],
         function: str = "loadURDF",
-        joints: Collection[str] = (),
+        parts: Collection[str] = (),
     ) -> None:
-        """`flags` are names of constants of `engine` for ``loadURDF``, `joints` the names by which the robot
-        is known among all bodies that another `function` loads."""
+        """`flags` are names of constants of `engine` for ``loadURDF``, `parts` the names of the root and the
+        joints, by which the robot is known among all bodies that another `function` loads."""
         super().__init__(engine, robot)
         self._fixed = fixed
         self._flags = sum(int(getattr(engine, flag)) for flag in flags)
         self._function = function
-        self._joint_names = frozenset(joints)
+        self._parts = frozenset(parts)
         self._file = path.read_bytes()
         self._path = path
         self._settings: list[Setting] = []
@@ -561,7 +561,8 @@ class LoadedClient(RobotClient):
         self.body = max(map(int, bodies), key=self._count_known)
 
     def _count_known(self, body: int) -> int:
-        """Count the joints of a body that are the robot's."""
+        """Count the root and the joints of a body that are the robot's."""
         joints = range(int(self.call(self.engine.getNumJoints, body)))
-        names = (self.call(self.engine.getJointInfo, body, k)[1] for k in joints)
-        return sum(name.decode("utf-8", "replace") in self._joint_names for name in names)
+        names = [self.call(self.engine.getJointInfo, body, k)[1] for k in joints]
+        names.append(self.call(self.engine.getBodyInfo, body)[0])
+        return sum(name.decode("utf-8", "replace") in self._parts for name in names)

@@ -320,7 +320,8 @@ class ContactsAsForces(CallingRule):
         if case.form == "mjcf":
             touching = [link for link in case.model.links if _collides(case, link.name)]
             if touching:
-                message = f"{len(touching)} bodies have geoms, which may touch each other and the world"
+                have = "1 body has" if len(touching) == 1 else f"{len(touching)} bodies have"
+                message = f"{have} geoms, which may touch each other and the world"
                 yield Detection(None, None, touching[0].line, message)
             return
         shaped = [link for link in case.source.root.all("link") if _first_shape(link) is not None]

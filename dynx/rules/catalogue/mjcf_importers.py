@@ -614,12 +614,12 @@ class ModelWithoutName(EditingRule):
 
 
 class WorldWithoutBody(Rule):
-    """DX615 world-without-body: The world has no body, so Pinocchio refuses the file.
+    """DX615 world-without-body: The world has no body, so some engines refuse the file.
 
     If a file describes only a floor, a table or settings, its ``<worldbody>`` has only geoms, or is empty.
 
-    - MuJoCo 4.0 and Drake 1.51 read a world in which nothing moves. PyBullet 3.2.7 also reads it if there is
-      a geom.
+    - MuJoCo 4.0 and Drake 1.51 read a world in which nothing moves.
+    - PyBullet 3.2.7 (``loadMJCF``) reads it if there is a geom, and otherwise loads no body.
     - Pinocchio 4.1 (``buildModelFromMJCF``) raises "No such node (body)" or "no body found in parsed tree".
 
     What to do: if the file of a robot includes this file, load the file of the robot. Otherwise do nothing.
@@ -629,7 +629,7 @@ class WorldWithoutBody(Rule):
     stated = True
     stated_refusal = True
     advice = "Load the file that includes this one."
-    engines = measured_on("pinocchio")
+    engines = measured_on("pinocchio", "pybullet")
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the world without a body."""
@@ -754,6 +754,45 @@ class FixedBodyFloats(Rule):
         document = mjcf_text(case)
         for body in _fixed_bodies(document):
             yield _found_body(document, body, "is fixed to the world")
+
+
+class ContactsWithTheWorld(CallingRule):
+    """DX620 contacts-with-the-world: The world has shapes, whose contacts PyBullet adds to forward dynamics.
+
+    A ``<geom>`` of ``<worldbody>`` is fixed to the world, for example a floor or a table.
+
+    - PyBullet 3.2.7 (``loadMJCF``) loads it as a body of its own. A step (``stepSimulation``) pushes the
+      robot out of this body. Inverse dynamics and the mass matrix have no contacts.
+    - MuJoCo 4.0 also has these contacts, in inverse dynamics too (DX308).
+    - Pinocchio 4.1 and Drake 1.51 (``CalcInverseDynamics``) compute dynamics without contacts.
+
+    The effect: where the robot reaches into the floor, the acceleration can have any error.
+
+    What to do: find out whether your accelerations include contacts. The file is correct, so ``dynx doctor
+    --fix`` does not change it. The doctor compares without contacts, and prints the call that switches them
+    off in PyBullet.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Switch contacts off if you need accelerations of the rigid bodies alone."
+    engines = measured_on("pybullet")
+    present_as = "contact_forces"
+    depends_on_state = True
+    calls = ("pybullet.no_contacts",)
+    changed = "compared without contacts"
+    per_joint = False
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield shapes of the world that may touch others."""
+        document = mjcf_text(case)
+        for part in parts_of_bodies(document, "geom"):
+            touches = any(
+                part.resolved.attributes.get(name, "1") != "0" for name in ("contype", "conaffinity")
+            )
+            if part.bodies == 0 and touches:
+                yield found_in(
+                    document, part.given, "the shape is fixed to the world, and may touch the robot"
+                )
 
 
 def _fixed_bodies(document: MjcfText) -> Iterator[Element]:
