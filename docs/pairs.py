@@ -35,42 +35,51 @@ file.
 
 ## How to read the tables
 
-- **Tolerance.** The tolerance is {tolerance:g}, because the numbers in many files have four or five digits.
-- **Verdict.** The verdict is about rigid-body dynamics. Limits, damping, armature, actuators and shapes do
-  not affect the verdict.
-- **Different does not mean wrong.** Two files often describe two versions of a robot. Or one file has a hand,
-  a sensor or a fixed joint that the other file lacks.
-- **URDF file.** A path without a repository is in the repository of the MJCF or SDF file.
-- **Elements.** The number of elements of the MJCF or SDF file that differ.
-- **Joints without counterpart.** The number of joints that only one file has. Joints behind such a joint are
-  not counted.
-- **Engines.** Two engines load the files without dynx: Pinocchio the URDF file, and MuJoCo the MJCF file or
-  Drake the SDF file. The column has the largest relative difference of total mass and joint-space inertia
-  between the two engines. For the inertia, the survey uses the joints that have a counterpart. `-` means that
-  an engine refuses a file, or that no joint has a counterpart.
+The numbers in many files have only four or five digits. So a difference counts only if it exceeds the
+tolerance {tolerance:g}. "Different" does not mean that a file is wrong. The two files often describe two
+versions of a robot. Or one file has a hand, a sensor or a fixed joint that the other file lacks.
 
-The column **largest difference** describes the element with the largest difference, for example:
+| column | meaning |
+|---|---|
+| URDF file | its path. A path without a repository is in the repository of the MJCF or SDF file |
+| verdict | whether both files have the same rigid-body dynamics. Limits, damping, armature, actuators and \
+shapes do not affect the verdict |
+| elements | number of elements of the MJCF or SDF file that differ |
+| joints without counterpart | number of joints that only one file has. Joints behind such a joint are not \
+counted |
+| largest difference | the element with the largest difference |
+| engines | how much two engines differ that load the files without dynx |
+
+**Engines.** Pinocchio loads the URDF file. MuJoCo loads the MJCF file, or Drake loads the SDF file. The column
+has the largest relative difference of total mass and joint-space inertia between the two engines. For the
+inertia, the survey uses the joints that have a counterpart. `-` means that an engine refuses a file, or that
+no joint has a counterpart.
+
+**Largest difference.** Examples:
 
 | in the table | meaning |
 |---|---|
 | `0.026: link torso, inertial` | the [size](same.md#what-the-report-contains) of the difference, and the \
 element of the MJCF or SDF file |
 | `mass 2 kg instead of 3 kg` | the MJCF or SDF file has 2 kg. With 3 kg it would agree with the URDF file |
+| `centre of mass 0.01 m off` | the centre of mass is 0.01 m away from the place where the files would agree |
+| `moments off by 0.5 of the largest` | an entry of the inertia tensor differs by half of the largest entry |
 | `merged body: mass 2 kg instead of 3 kg` | fixed joints connect the link to others, and these links form \
 one merged body. The total inertia of the merged body differs |
-| `merged body without wrist: mass 2 kg instead of -1 kg` | the link `wrist` of the same merged body also \
-has mass, which is not in the 2 kg. If `wrist` keeps its mass, this link needs -1 kg |
+| `merged body without wrist: mass 2 kg instead of -1 kg` | the link `wrist` belongs to the same merged body. \
+The rest of this body has 2 kg. If `wrist` keeps its mass, the rest needs -1 kg |
 
 ## How the survey checks dynx
 
-- If the report says "same", and the two engines differ by more than ten times the tolerance, a difference
-  is *missed*.
-- If the report says "different" and each joint has a counterpart, the survey repairs the MJCF or SDF file. It
-  replaces all elements that the report names. If the engines still differ by more than ten times the
-  tolerance, a difference is *missed*. If MuJoCo or Drake refuses the file, Pinocchio loads the repaired robot
-  instead.
-- The survey also puts each original element alone back into the repaired robot. The mass or the joint-space
-  inertia in Pinocchio must then change. Otherwise the report named the element wrongly.
+- **Reports that say "same".** If the two engines differ by more than ten times the tolerance, the report
+  *missed* a difference.
+- **Reports that say "different".** If each joint has a counterpart, the survey repairs the MJCF or SDF file:
+  it replaces all elements that the report names. If the engines still differ by more than ten times the
+  tolerance, the report *missed* a difference. If MuJoCo or Drake refuses the file, Pinocchio loads the
+  repaired robot instead.
+- **Elements that should not be in a report.** The survey puts each original element alone back into the
+  repaired robot. The mass or the joint-space inertia in Pinocchio must then change. Otherwise the report
+  named the element wrongly.
 
 A report counts as checked if engines could compare the pair itself or the repaired file.
 

@@ -555,11 +555,10 @@ def summary(results: Sequence[PairResult]) -> str:
     reinserted = sum(each.reinserted for each in results)
     effective = reinserted - sum(len(each.unreal) for each in results)
     return (
-        f"Of {len(results)} pairs, both files describe the same robot in {words['same']} pairs, and "
-        f"different robots in {words['different']} pairs. Pairs that dynx refuses: {words['refused']}. "
-        f"Engines checked the reports of {len(judged_ones)} pairs. Pairs with a missed difference: "
-        f"{sum(map(missed, results))}. Of {reinserted} reinserted elements, {effective} change the robot in "
-        "Pinocchio."
+        f"Of {len(results)} pairs, {words['same']} pairs describe the same robot, and {words['different']} "
+        f"pairs describe different robots. Pairs that dynx refuses: {words['refused']}. Engines checked the "
+        f"reports of {len(judged_ones)} pairs. Pairs with a missed difference: {sum(map(missed, results))}. "
+        f"The survey put {reinserted} elements back. {effective} of them change the robot in Pinocchio."
     )
 
 
