@@ -50,8 +50,8 @@ counted |
 | largest difference | the element with the largest difference |
 | engines | how much two engines differ that load the files without dynx |
 
-**Engines.** Pinocchio loads the URDF file. MuJoCo loads the MJCF file, or Drake loads the SDF file. The column
-has the largest relative difference of total mass and joint-space inertia between the two engines. For the
+**Engines.** Pinocchio loads the URDF file. MuJoCo loads the MJCF file, or Drake loads the SDF file. The
+column has the largest relative difference of total mass and joint-space inertia between the two engines. For the
 inertia, the survey uses the joints that have a counterpart. `-` means that an engine refuses a file, or that
 no joint has a counterpart.
 
@@ -66,8 +66,8 @@ element of the MJCF or SDF file |
 | `moments off by 0.5 of the largest` | an entry of the inertia tensor differs by half of the largest entry |
 | `merged body: mass 2 kg instead of 3 kg` | fixed joints connect the link to others, and these links form \
 one merged body. The total inertia of the merged body differs |
-| `merged body without wrist: mass 2 kg instead of -1 kg` | the link `wrist` belongs to the same merged body. \
-The rest of this body has 2 kg. If `wrist` keeps its mass, the rest needs -1 kg |
+| `merged body without wrist: mass 2 kg instead of -1 kg` | the link `wrist` belongs to the same merged \
+body. The rest of this body has 2 kg. If `wrist` keeps its mass, the rest needs -1 kg |
 
 ## How the survey checks dynx
 
