@@ -51,9 +51,9 @@ counted |
 | engines | how much two engines differ that load the files without dynx |
 
 **Engines.** Pinocchio loads the URDF file. MuJoCo loads the MJCF file, or Drake loads the SDF file. The
-column has the largest relative difference of total mass and joint-space inertia between the two engines. For the
-inertia, the survey uses the joints that have a counterpart. `-` means that an engine refuses a file, or that
-no joint has a counterpart.
+column has the largest relative difference of total mass and joint-space inertia between the two engines. For
+the inertia, the survey uses the joints that have a counterpart. `-` means that an engine refuses a file, or
+that no joint has a counterpart.
 
 **Largest difference.** Examples:
 
