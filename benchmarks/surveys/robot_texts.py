@@ -133,6 +133,8 @@ class Link:
     name: str
     inertial: Inertial | None = None
     shapes: list[Shape] = field(default_factory=list)
+    compensation: float = 0.0
+    """Share of its weight that MuJoCo holds (MJCF only)."""
 
     @property
     def is_empty(self) -> bool:
@@ -246,6 +248,18 @@ class Actuator:
 
 
 @dataclass
+class Sensor:
+    """A sensor of a joint or tendon: `kind` and `target` are those of MJCF."""
+
+    name: str
+    kind: str
+    target: str
+    on_tendon: bool = False
+    cutoff: float = 0.0
+    noise: float = 0.0
+
+
+@dataclass
 class Robot:
     """Links and joints in the order of the document, and what MJCF alone has.
 
@@ -261,6 +275,7 @@ class Robot:
     equalities: list[Equality] = field(default_factory=list)
     keyframes: list[Keyframe] = field(default_factory=list)
     actuators: list[Actuator] = field(default_factory=list)
+    sensors: list[Sensor] = field(default_factory=list)
 
     @property
     def has_connect(self) -> bool:
@@ -484,6 +499,8 @@ class Style:
     """A floating base of MJCF by `<joint type="free">`."""
     quat_scale: float = 1.0
     """Factor of quaternions in keyframes of MJCF; none is a difference."""
+    names: bool = True
+    """Constraints and actuators of MJCF have names."""
     child_class: bool = False
     """The default class of joints of MJCF is that of the bodies of the robot, not the main one."""
     constraint_sites: bool = False
@@ -698,6 +715,8 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
                 place(ET.SubElement(body, "site", name=f"{each.name}_second"), at)
 
     def fill(body: ET.Element, link: Link) -> None:
+        if link.compensation:
+            body.set("gravcomp", style.number(float(link.compensation)))
         if style.constraint_sites:
             add_constraint_sites(body, link.name)
         if link.inertial is not None and (link.inertial.mass or np.any(link.inertial.tensor)):
@@ -843,6 +862,7 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
         for body in (*world.findall("body"), *world.findall("frame/body")):
             body.set("childclass", "usual")
     _write_couplings(root, robot, style)
+    _write_sensors(root, robot, style)
     _shuffled(style, root)
     _write_keyframes(root, robot, floating, style)
     return _finished(root)
@@ -951,6 +971,16 @@ def _write_couplings(root: ET.Element, robot: Robot, style: Style) -> None:
                     element.set(f"{name}range", _text(style, limits))
             elements.append(element)
         _hoist(style, root, elements, kind, {"joint", "tendon"})
+
+
+def _write_sensors(root: ET.Element, robot: Robot, style: Style) -> None:
+    section = ET.SubElement(root, "sensor") if robot.sensors else root
+    for sensor in robot.sensors:
+        element = ET.SubElement(section, sensor.kind, name=sensor.name)
+        element.set("tendon" if sensor.on_tendon else "joint", sensor.target)
+        for name, value in (("cutoff", sensor.cutoff), ("noise", sensor.noise)):
+            if value or style.spelled:
+                element.set(name, style.number(float(value)))
 
 
 _ENDS = {f"{kind}{i}" for kind in ("body", "site", "joint", "tendon") for i in (1, 2)}

@@ -1,4 +1,4 @@
-"""Planted differences of 79 kinds for the survey of ``dynx same``, and the elements they change."""
+"""Planted differences of 84 kinds for the survey of ``dynx same``, and the elements they change."""
 
 from __future__ import annotations
 
@@ -444,6 +444,7 @@ for _name in ("coefficient", "member", "range", "stiffness", "rest", "damping", 
 @plant("tendon missing", ("mjcf",))
 def _tendon_missing(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
     used = {each.target for each in robot.actuators if each.on_tendon}
+    used |= {sensor.target for sensor in robot.sensors if sensor.on_tendon}
     used |= {name for each in robot.equalities if each.kind == "tendon" for name in (each.first, each.second)}
     tendon = _pick(rng, [each for each in robot.tendons if each.name not in used])
     robot.tendons.remove(tendon)
@@ -564,6 +565,40 @@ def _actuator_value(name: str) -> Plant:
 
 for _name in ("gain", "gear", "ctrl range", "force range", "target", "missing"):
     plant(f"actuator {_name} of a servo", ("mjcf",))(_actuator_value(_name))
+
+
+@plant("gravity compensation", ("mjcf",))
+def _compensation(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    link, _, _, _ = _heavy(robot, rng)
+    if robot.is_static(link.name) or link.inertial is None or link.inertial.mass < size:
+        raise NotHereError
+    link.compensation += size
+    return Planted("attribute gravity compensation", robot.body(link.name))
+
+
+def _sensor_value(name: str) -> Plant:
+    def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+        sensor = _pick(rng, robot.sensors)
+        names = {sensor.name, sensor.target}
+        if name == "missing":
+            robot.sensors = [each for each in robot.sensors if each is not sensor]
+        elif name == "target":
+            types = {"joint": "moves", "ballq": "is_ball", "balla": "is_ball"}
+            if sensor.on_tendon:
+                raise NotHereError
+            found = [each.name for each in robot.joints if getattr(each, types[sensor.kind[:5]])]
+            sensor.target = _pick(rng, [each for each in found if each != sensor.target])
+        elif not getattr(sensor, name):
+            raise NotHereError
+        else:
+            setattr(sensor, name, getattr(sensor, name) * (1.0 + size))
+        return Planted("attribute sensor", names | {sensor.target})
+
+    return change
+
+
+for _name in ("cutoff", "noise", "target", "missing"):
+    plant(f"sensor {_name}", ("mjcf",))(_sensor_value(_name))
 
 
 @plant("link missing")

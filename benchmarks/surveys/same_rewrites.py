@@ -6,7 +6,8 @@
 Each seed draws a robot (of example-robot-data, of models/, or a random one), base, formats and changes.
 Both were written from the specifications of URDF, MJCF and SDF before the comparison was opened. Whether a
 rewrite keeps the robot, and whether a planted difference is one, engines decide that know nothing of dynx
-(`robot_truth`): mass matrices and gravity at random states. A run that was interrupted continues with
+(`robot_truth`): mass matrices and gravity at random states. For what MJCF alone has, MuJoCo decides: lengths
+of tendons and actuators, errors of constraints, and keyframes. A run that was interrupted continues with
 ``--record``; ``--jobs`` runs several seeds at once, ``--seconds`` ends a run after that time, ``--report``
 only prints the counts of the record.
 
@@ -19,6 +20,7 @@ that engines and joint lines do not see lies in the null space: there "same" is 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import time
 from collections import Counter
@@ -43,6 +45,7 @@ from benchmarks.surveys.robot_texts import (
     Link,
     Matrix,
     Robot,
+    Sensor,
     Shape,
     Style,
     Tendon,
@@ -265,6 +268,19 @@ def decorate(robot: Robot, rng: np.random.Generator, floating: bool) -> None:
         actuator.ctrl_range = interval(2.0) if rng.random() < 0.5 else None
         actuator.force_range = interval(20.0) if rng.random() < 0.5 else None
         robot.actuators.append(actuator)
+    for link in robot.links.values():
+        if not link.is_empty and link.name != "world" and rng.random() < 0.1:
+            link.compensation = round(rng.uniform(0.1, 1), 3)
+    balls = [joint.name for joint in robot.joints if joint.is_ball]
+    choices = [("jointpos", moving), ("jointvel", moving), ("ballquat", balls), ("ballangvel", balls)]
+    choices.append(("tendonpos", [tendon.name for tendon in robot.tendons]))
+    for i in several(3):
+        what, targets = choices[int(rng.integers(len(choices)))]
+        if targets:
+            sensor = Sensor(f"sensor_{i}", what, str(rng.choice(targets)), what == "tendonpos")
+            sensor.cutoff, sensor.noise = (round(rng.uniform(0.1, 1), 3) for _ in "ab")
+            sensor.cutoff *= what != "ballquat"  # MuJoCo refuses it
+            robot.sensors.append(sensor)
     shapes = {
         name: [each for each in link.shapes if not each.visual and each.kind != "mesh"]
         for name, link in robot.links.items()
@@ -418,6 +434,26 @@ def offset_links(it: Rewritten, rng: np.random.Generator, floating: bool) -> Non
         it.move_frame(name, pose(None, p))
 
 
+def exchange_ends(it: Rewritten, rng: np.random.Generator, floating: bool) -> None:
+    """Name the links of constraints in the other order, with the points and turns that this needs."""
+    poses = it.robot.poses()
+    for each in it.robot.equalities:
+        if not each.joins_links or rng.random() < 0.5:
+            continue
+        first, second = each.first, each.second
+        if each.kind == "connect":
+            point = inverse(poses[second]) @ poses[first] @ np.append(each.anchor, 1.0)
+            each.anchor = point[:3]
+        else:
+            each.anchor, each.T = each.T[:3, 3], pose(each.T[:3, :3].T, each.anchor)
+        each.first, each.second = second, first
+
+
+def without_names(text: str) -> str:
+    """Return MJCF whose constraints and actuators have no names."""
+    return re.sub(r' name="(equality|actuator)_\d+"', "", text)
+
+
 def align_chains(it: Rewritten) -> None:
     """Turn frames between joints of one body of MJCF like the body, for MJCF states only one frame."""
     robot = it.robot
@@ -470,7 +506,7 @@ def split_links(it: Rewritten, rng: np.random.Generator, floating: bool) -> None
         T = pose(random_rotation(rng), rng.uniform(-0.2, 0.2, 3))
         second = Inertial(own.mass * (1 - share), own.com - share * d, (1 - share) * rest, own.frame)
         link.inertial = Inertial(own.mass * share, own.com + (1 - share) * d, share * rest, own.frame)
-        new = Link(f"{name}_second", second.moved(inverse(T)))
+        new = Link(f"{name}_second", second.moved(inverse(T)), compensation=link.compensation)
         for shape in list(link.shapes):
             if rng.random() < 0.5:
                 link.shapes = [each for each in link.shapes if each is not shape]
@@ -494,6 +530,8 @@ def merge_links(it: Rewritten, rng: np.random.Generator, floating: bool) -> None
         if link.is_empty or into.is_empty or rng.random() < 0.4:
             continue
         if any({joint.parent, joint.child} & set(pair) for pair in robot.exclusions):
+            continue
+        if link.compensation != into.compensation:
             continue
         it.move_frame(link.name, inverse(joint.T))
         for each in robot.equalities:
@@ -562,9 +600,10 @@ def rename_joints(robot: Robot, names: dict[str, str]) -> None:
             equality.second = names.get(equality.second, equality.second)
     for key in robot.keyframes:
         key.q = {names.get(name, name): value for name, value in key.q.items()}
-    for actuator in robot.actuators:
-        if not actuator.on_tendon:
-            actuator.target = names.get(actuator.target, actuator.target)
+    on_joints: list[Actuator | Sensor] = [*robot.actuators, *robot.sensors]
+    for each in on_joints:
+        if not each.on_tendon:
+            each.target = names.get(each.target, each.target)
     for joint in robot.joints:
         joint.name = names.get(joint.name, joint.name)
         if joint.mimic is not None:
@@ -602,7 +641,7 @@ def exchange_inertia(it: Rewritten, rng: np.random.Generator, floating: bool) ->
         parent, child = robot.links[joint.parent], robot.links[joint.child]
         if joint.type == "fixed" or joint.mimic is not None:
             continue
-        if child.inertial is None or parent.inertial is None:
+        if child.inertial is None or parent.inertial is None or child.compensation != parent.compensation:
             continue
         if rng.random() < 0.5:
             continue
@@ -643,6 +682,7 @@ REWRITES: dict[str, Callable[[Rewritten, np.random.Generator, bool], None]] = {
     "null space": exchange_inertia,
     "zero poses of balls": turn_zero_poses,
     "offset links": offset_links,
+    "exchanged ends": exchange_ends,
     "references": change_references,
     "names": rename,
 }
@@ -662,6 +702,7 @@ def draw_style(rng: np.random.Generator) -> Style:
         sites=bool(rng.random() < 0.3),
         free_joint=bool(rng.random() < 0.5),
         quat_scale=float(rng.choice([1.0, -1.0, 0.4, -3.0])),
+        names=bool(rng.random() < 0.8),
         child_class=bool(rng.random() < 0.3),
         constraint_sites=bool(rng.random() < 0.3),
         general=bool(rng.random() < 0.3),
@@ -674,6 +715,7 @@ def style_words(style: Style) -> list[str]:
     """Return the freedoms that a style uses, in words."""
     words = ["defaults spelled out" if style.spelled else "defaults removed"]
     words += ["order"] * (style.shuffle is not None) + ["degrees"] * style.degree
+    words += ["no names"] * (not style.names)
     for name in ("includes", "general", "frames", "constraint_sites", "child_class"):
         words += [name] * getattr(style, name)
     return words
@@ -683,7 +725,9 @@ def fit_formats(robot: Robot, formats: set[Format]) -> str:
     """Remove from the robot what a format cannot say; return why it cannot be written at all."""
     if formats != {"mjcf"}:
         robot.exclusions, robot.contacts, robot.tendons, robot.equalities = [], [], [], []
-        robot.keyframes, robot.actuators = [], []
+        robot.keyframes, robot.actuators, robot.sensors = [], [], []
+        for link in robot.links.values():
+            link.compensation = 0.0
     for joint in robot.joints:
         if "urdf" in formats:
             joint.stiffness = joint.rest = 0.0
@@ -852,15 +896,16 @@ def rewrite_row(seed: int) -> Row:
         truth, wrong = f"unchecked: {str(error).splitlines()[0][:80]}", False
     base = "floating" if floating else "fixed"
     seconds = 0.0
+    b = without_names(second) if formats[1] == "mjcf" and not style.names else second
     if wrong:
         outcome = "generator wrong"
     else:
         try:
             report, seconds = compare(
-                first, second, base if set(formats) == {"urdf"} else None, None, is_split(formats, style)
+                first, b, base if set(formats) == {"urdf"} else None, None, is_split(formats, style)
             )
             attributes = attribute_words(report)
-            if it.renamed:
+            if it.renamed or not style.names:
                 attributes = [each for each in attributes if not each.startswith("name of")]
             if not report.same or report.differences or report.unmatched:
                 said = [
