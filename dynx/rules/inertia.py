@@ -488,7 +488,7 @@ class ImpossibleInertia(Rule):
     )
     choices: ClassVar[Mapping[str, str]] = {
         "fuse": (
-            "merge the link with rigidly connected links if a body can have their inertia; otherwise like "
+            "merge the link with rigidly connected links if a body can have their inertia; otherwise as with "
             "nearest"
         ),
         "nearest": "write the nearest tensor that a body can have",

@@ -180,7 +180,7 @@ class MujocoSettings(EditingRule):
     engines = measured_on("mujoco")
     choices = {
         "remove": "remove settings of MuJoCo that change masses or forces",
-        "keep": "keep them; MuJoCo then reads another robot",
+        "keep": "keep these settings; MuJoCo then reads another robot",
     }
     changed = "removed settings of MuJoCo that change masses or forces"
 

@@ -208,7 +208,7 @@ class EmptyDynamics(EditingRule):
 
 
 class LimitsAsForces(CallingRule):
-    """DX306 limits-as-forces: A joint has two equal limits; some engines pull the joint to them.
+    """DX306 limits-as-forces: A joint has two equal limits, and PyBullet pulls the joint to them.
 
     ``<limit lower="-2" upper="2"/>`` defines the range of a joint. URDF does not define what happens beyond
     this range. A joint with two equal limits is beyond its range at every other position.

@@ -63,7 +63,7 @@ class TextureNotFound(EditingRule):
     engines = measured_on("drake")
     choices = {
         "colour": "write a grey colour in place of textures that Drake does not find",
-        "keep": "keep them; Drake then refuses the file",
+        "keep": "keep such textures; Drake then refuses the file",
     }
     changed = "write a grey colour in place of textures that Drake does not find"
 

@@ -141,7 +141,7 @@ class MasslessRoot(Rule):
     engines = measured_on("pybullet")
     advice = "Give the root link the mass of the body that it represents."
     choices = {
-        "lump": "merge the root with the heaviest rigidly connected link; else give the root the least mass",
+        "lump": "merge the root with the heaviest rigidly connected link; without one, write the least mass",
         "keep": "keep the file; PyBullet then fixes the robot to the world",
     }
     trap_base = "floating"

@@ -763,14 +763,14 @@ class ContactsWithTheWorld(CallingRule):
 
     - PyBullet 3.2.7 (``loadMJCF``) loads it as a body of its own. A step (``stepSimulation``) pushes the
       robot out of this body. Inverse dynamics and the mass matrix have no contacts.
-    - MuJoCo 4.0 also has these contacts, in inverse dynamics too (DX308).
+    - MuJoCo 4.0 also has these contacts, even in inverse dynamics (DX308).
     - Pinocchio 4.1 and Drake 1.51 (``CalcInverseDynamics``) compute dynamics without contacts.
 
     The effect: where the robot reaches into the floor, the acceleration can have any error.
 
-    What to do: find out whether your accelerations include contacts. The file is correct, so ``dynx doctor
-    --fix`` does not change it. The doctor compares without contacts, and prints the call that switches them
-    off in PyBullet.
+    What to do: find out whether your accelerations include contacts. The file is correct, so
+    ``dynx doctor --fix`` does not change the file. The doctor compares without contacts, and prints the call
+    that switches them off in PyBullet.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("mjcf",)

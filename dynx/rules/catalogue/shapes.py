@@ -45,7 +45,7 @@ class UnknownCollisionShape(EditingRule):
     engines = measured_on("mujoco")
     choices = {
         "remove": "remove collisions of a shape that not every engine knows",
-        "keep": "keep them; MuJoCo then refuses the file",
+        "keep": "keep such collisions; MuJoCo then refuses the file",
     }
     changed = "removed collisions of unknown shape"
 
@@ -82,7 +82,7 @@ class ShapeWithoutGeometry(EditingRule):
     engines = measured_on("pybullet", "mujoco")
     choices = {
         "remove": "remove visuals and collisions without a geometry that an engine supports",
-        "keep": "keep them; engines then refuse the file",
+        "keep": "keep such elements; engines then refuse the file",
     }
     changed = "removed visuals and collisions without geometry"
 
@@ -141,7 +141,7 @@ class CollisionShapeWithoutSize(EditingRule):
     choices = {
         "remove": "remove collisions without size",
         "thicken": "write 1e-6 m for sizes of zero; remove a collision only if a size is missing",
-        "keep": "keep them; engines that need a size then refuse the file",
+        "keep": "keep such collisions; engines that need a size then refuse the file",
     }
     changed = "removed collision shapes without size or file, or gave them a size"
 
@@ -220,7 +220,7 @@ class VisualIncomplete(EditingRule):
     engines = measured_on("pybullet", "mujoco")
     choices = {
         "complete": "remove visuals with an incomplete shape, and complete their materials",
-        "keep": "keep them; engines then refuse the file",
+        "keep": "keep such visuals; engines then refuse the file",
     }
     changed = "removed incomplete visuals, and completed the materials of visuals"
 

@@ -199,7 +199,7 @@ class LoopJoint(EditingRule):
     advice = "Remove the <loop_joint> and close the loop in the program."
     engines = measured_on("drake")
     choices = {
-        "remove": "remove loop joints, which leaves the tree",
+        "remove": "remove loop joints; the tree remains",
         "keep": "keep loop joints; Drake then refuses the file",
     }
     changed = "removed loop joints"
