@@ -217,6 +217,8 @@ class Equality:
     polynomial: Matrix = field(default_factory=lambda: np.array([0.0, 1.0, 0.0, 0.0, 0.0]))
     active: bool = True
     time_constant: float = 0.02
+    is_closed: bool = False
+    """A weld that holds in the pose of the file; `T` follows from it."""
 
     @property
     def joins_links(self) -> bool:
@@ -280,7 +282,13 @@ class Robot:
     @property
     def has_connect(self) -> bool:
         """Whether a constraint depends on the pose of the file."""
-        return any(each.kind == "connect" for each in self.equalities)
+        return any(each.kind == "connect" or each.is_closed for each in self.equalities)
+
+    def close_weld(self, weld: Equality) -> None:
+        """Let a weld hold in the pose with every joint at 0."""
+        poses = self.poses()
+        between = inverse(poses[weld.first]) @ poses[weld.second]
+        weld.T = pose(between[:3, :3], (between @ np.append(weld.anchor, 1.0))[:3])
 
     def is_static(self, link: str) -> bool:
         """Whether no joint but fixed ones stands between a link and the root."""
@@ -637,6 +645,9 @@ def write_urdf(robot: Robot, style: Style | None = None) -> str:
 def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
     """Return the robot as MJCF; ValueError for what the format or this writer lacks: mimics, meshes."""
     style = style or Style()
+    for each in robot.equalities:
+        if each.is_closed:
+            robot.close_weld(each)
     if any(joint.mimic is not None for joint in robot.joints):
         raise ValueError("a mimic is no joint of MJCF")
     if any(joint.type not in (*MOVING, "fixed", "ball") for joint in robot.joints):
@@ -827,7 +838,8 @@ def write_mjcf(robot: Robot, floating: bool, style: Style | None = None) -> str:
             element.set("armature", style.number(float(joint.armature)))
         if joint.stiffness and joint.moves:
             element.set("stiffness", style.number(float(joint.stiffness)))
-            element.set("springref", style.number(factor * float(joint.rest)))
+            if joint.rest or style.spelled:
+                element.set("springref", style.number(factor * float(joint.rest)))
         if joint.ref:
             element.set("ref", style.number(factor * float(joint.ref)))
         if joint.effort and joint.moves:
@@ -896,6 +908,10 @@ def _write_couplings(root: ET.Element, robot: Robot, style: Style) -> None:
     number = style.number
     refs = {joint.name: joint.ref for joint in robot.joints}
     lengths = {each.name: sum(c * refs[joint] for joint, c in each.terms.items()) for each in robot.tendons}
+    rests = {joint.name: joint.rest if joint.stiffness else 0.0 for joint in robot.joints}
+    lengths_of_springs = {
+        each.name: sum(c * rests[joint] for joint, c in each.terms.items()) for each in robot.tendons
+    }
     section = ET.SubElement(root, "tendon") if robot.tendons else root
     elements = []
     for tendon in robot.tendons:
@@ -909,6 +925,8 @@ def _write_couplings(root: ET.Element, robot: Robot, style: Style) -> None:
             ("damping", tendon.damping),
             ("frictionloss", tendon.friction),
         ):
+            if name == "springlength" and value == lengths_of_springs[tendon.name] and not style.spelled:
+                continue  # the spring has no force where those of the joints have none
             element.set(name, number(float(value)))
         for joint, coefficient in tendon.terms.items():
             ET.SubElement(element, "joint", joint=joint, coef=number(float(coefficient)))
@@ -929,8 +947,9 @@ def _write_couplings(root: ET.Element, robot: Robot, style: Style) -> None:
         if each.joins_links:
             element.attrib.update(body1=each.first, body2=each.second, anchor=_text(style, each.anchor))
             if each.kind == "weld":
-                element.set("relpose", _text(style, [*each.T[:3, 3], *quat_wxyz(each.T[:3, :3])]))
                 element.set("torquescale", number(float(each.torque_scale)))
+                if style.spelled or not each.is_closed:
+                    element.set("relpose", _text(style, [*each.T[:3, 3], *quat_wxyz(each.T[:3, :3])]))
             continue
         zero = refs if each.kind == "joint" else lengths
         element.set(f"{each.kind}1", each.first)

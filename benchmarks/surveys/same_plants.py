@@ -456,6 +456,9 @@ def _equality_value(name: str, kinds: tuple[str, ...]) -> Plant:
         each = _pick(rng, [each for each in robot.equalities if each.kind in kinds])
         d = rng.normal(size=3)
         d /= np.linalg.norm(d)
+        if each.is_closed and name in ("point", "attitude"):
+            robot.close_weld(each)
+            each.is_closed = False
         if name == "anchor":
             each.anchor = each.anchor + size * robot.reach * d
         elif name == "point":
@@ -909,7 +912,7 @@ def judged(
     ]
     unmatched = [f"{each.kind} {each.ours}/{each.theirs}" for each in report.unmatched]
     attributes = attribute_words(report)
-    told = "; ".join([*elements, *unmatched, *attributes])[:300] or "nothing"
+    told = "; ".join([*elements, *unmatched, *attributes])[:600] or "nothing"
     if expected == "nothing":
         return "right" if report.same and not (elements or unmatched or attributes) else f"false: {told}"
     if expected == "null space":

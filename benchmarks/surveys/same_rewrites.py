@@ -224,6 +224,7 @@ def decorate(robot: Robot, rng: np.random.Generator, floating: bool) -> None:
         terms = {str(name): round(float(rng.choice([-1, 1]) * rng.uniform(0.1, 2.0)), 3) for name in names}
         tendon = Tendon(f"tendon_{i}", terms, interval(2.0) if rng.random() < 0.5 else None)
         tendon.stiffness, tendon.rest = round(rng.uniform(0.1, 5), 3), round(rng.uniform(-0.5, 0.5), 3)
+        tendon.rest *= rng.random() < 0.7
         tendon.damping, tendon.friction = (
             round(rng.uniform(0, 1), 3) if rng.random() < 0.5 else 0.0 for _ in "ab"
         )
@@ -242,7 +243,9 @@ def decorate(robot: Robot, rng: np.random.Generator, floating: bool) -> None:
             each.second = str(rng.choice(apart))
             each.anchor = rng.uniform(-0.2, 0.2, 3).round(3)
             each.T = pose(random_rotation(rng), rng.uniform(-0.3, 0.3, 3))
-            each.torque_scale = round(rng.uniform(0.5, 2), 2) if kind == "weld" else 1.0
+            if kind == "weld":
+                each.torque_scale = round(rng.uniform(0.5, 2), 2)
+                each.is_closed = bool(rng.random() < 0.3)
         else:
             names = rng.permutation(moving if kind == "joint" else [tendon.name for tendon in robot.tendons])
             if len(names) == 0:
@@ -440,6 +443,8 @@ def exchange_ends(it: Rewritten, rng: np.random.Generator, floating: bool) -> No
     for each in it.robot.equalities:
         if not each.joins_links or rng.random() < 0.5:
             continue
+        if each.is_closed:
+            it.robot.close_weld(each)
         first, second = each.first, each.second
         if each.kind == "connect":
             point = inverse(poses[second]) @ poses[first] @ np.append(each.anchor, 1.0)
