@@ -455,12 +455,12 @@ def _outermost_xacro(root: SourceElement) -> Iterator[SourceElement]:
 class MalformedXml(Rule):
     """DX532 malformed-xml: The text is not well-formed XML; engines read it, and other programs refuse it.
 
-    All four engines parse URDF with tinyxml2, which accepts some faults: ``--`` in a comment, ``&`` or ``<``
-    in a name, attributes without white space between them, and a blank after ``<``. It also accepts
-    ``<!mesh ...>`` in place of a comment, a malformed or second XML declaration, text before ``<robot>`` and
-    elements after ``</robot>``. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load such a file
-    without a warning, and read the same robot. Python's XML parsers, xacro and the launch system of ROS
-    refuse it.
+    All four engines parse URDF with tinyxml2, which accepts some faults. Examples are ``--`` in a comment,
+    ``&`` or ``<`` in a name, attributes without white space between them, and a blank after ``<``. It also
+    accepts ``<!mesh ...>`` in place of a comment, a malformed or second XML declaration, text before
+    ``<robot>`` and elements after ``</robot>``. Pinocchio 4.1, PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 load
+    such a file without a warning, and read the same robot. Python's XML parsers, xacro and the launch system
+    of ROS refuse it.
 
     dynx reads the file as the engines do, with a note. tinyxml2 and dynx refuse other faults: an attribute
     that occurs twice or has no quotes, and an element that does not end. dynx names the line.

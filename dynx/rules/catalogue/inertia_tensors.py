@@ -427,7 +427,7 @@ class InertialRotationIgnored(Rule):
       (issue 3559 of MuJoCo's repository). MuJoCo 4.0.0 is right.
     - Pinocchio 4.1.0, PyBullet 3.2.7, Drake 1.51.1 are right.
 
-    The effect grows with the difference between the principal moments: for long thin links, entries of the
+    The effect grows with the difference between the principal moments. For long thin links, entries of the
     mass matrix are wrong by up to a factor of ten. Mass and centre of mass are right, so poses and gravity
     torques are right.
 
@@ -586,13 +586,14 @@ class InertiaRoundedUnsymmetrically(Rule):
     """DX119 inertia-rounded-unsymmetrically: PyBullet's inverse dynamics refuses the robot because of
     rounding errors in a heavy link's tensor.
 
-    Before the first call of ``calculateInverseDynamics``, ``calculateMassMatrix`` or ``calculateJacobian``,
-    PyBullet 3.2.7 computes the tensor of each link about the link's origin, and checks that it is symmetric.
-    It computes two opposite entries as ``(m x) y`` and ``(m y) x``, whose rounding errors differ. Here m is
-    the mass, and x and y are two coordinates of the centre of mass along the principal axes. PyBullet
-    compares the difference of the two entries with a fixed bound of 1.1e-15 kg m^2 (five units in the last
-    place of 1), whatever the size of the link. So a link can fail if m x y is above 2 kg m^2. In a test with
-    centres of mass within half a metre, a quarter of the links failed at 100 kg, and four of five at 100 t.
+    PyBullet 3.2.7 checks each link before the first call of ``calculateInverseDynamics``,
+    ``calculateMassMatrix`` or ``calculateJacobian``. It computes the tensor of the link about the link's
+    origin, and checks that the tensor is symmetric. It computes two opposite entries as ``(m x) y`` and
+    ``(m y) x``, whose rounding errors differ. Here m is the mass, and x and y are two coordinates of the
+    centre of mass along the principal axes. PyBullet compares the difference of the two entries with a fixed
+    bound of 1.1e-15 kg m^2 (five units in the last place of 1), whatever the size of the link. So a link can
+    fail if m x y is above 2 kg m^2. In a test with centres of mass within half a metre, a quarter of the
+    links failed at 100 kg, and four of five at 100 t.
 
     - PyBullet 3.2.7 prints "invalid inertia tensor for body 3 I(2,0)!=I(0,2)", and all three calls raise an
       exception for this robot. PyBullet also checks links that cannot move, but never the root. Poses and the

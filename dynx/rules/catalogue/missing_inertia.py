@@ -181,20 +181,21 @@ class MasslessLinkWithInertia(Rule):
     sensor was set to zero, and its tensor was kept.
 
     - Drake 1.51.1 gives the link a mass of 1 kg, with a warning ("condition 'mass > 0' failed").
-    - MuJoCo 4.0.0 drops the tensor if the link is rigidly connected to another link (its default
-      ``fusestatic``). It refuses the file if a joint moves the link by itself. If the link cannot move, it
+    - MuJoCo 4.0.0 drops the tensor if the link is rigidly connected to another link (MuJoCo's default
+      ``fusestatic``). If the link moves by itself, MuJoCo refuses the file. If the link cannot move, MuJoCo
       refuses only a tensor that no body can have ("inertia must satisfy A + B >= C").
     - Pinocchio 4.1.0 and PyBullet 3.2.7 use the numbers unchanged, as dynx does.
 
-    The effect on the robot bolt, whose feet have no mass: in Drake torques are up to 23 times too large, and
-    in MuJoCo the error is 1e-4.
+    For example, the feet of the robot bolt have no mass. In Drake the torques of this robot are up to 23
+    times too large, and in MuJoCo they are off by 1e-4.
 
     What to do: give the link its mass.
 
-    ``dynx doctor --fix`` adds the tensor to the tensor of a link with mass that is rigidly connected to this
-    link, if possible its parent. The massless link gets a zero tensor. The equations of motion are the same.
-    If there is no such link, the massless link gets a mass of 2e-15 kg. Every engine accepts this mass, which
-    is too small to show in any result. If the massless link cannot move, its tensor becomes zero.
+    ``dynx doctor --fix`` adds the tensor to that of another link with mass, which is rigidly connected to the
+    massless link. If possible, this other link is the parent. The massless link gets a zero tensor. The
+    equations of motion are the same. If there is no such link, the massless link gets a mass of 2e-15 kg.
+    Every engine accepts this mass, which is too small to show in any result. If the massless link cannot
+    move, its tensor becomes zero.
     """
 
     engines = measured_on("drake", "mujoco")
@@ -397,8 +398,8 @@ class NoInertialData(Rule):
 class NegativeMass(EditingRule):
     """DX120 negative-mass: The mass of a link is negative.
 
-    No body has a negative mass. A negative mass comes from an edit by hand, from an exporter that subtracts a
-    hole, or from a "correction" of the total mass of several links.
+    No body has a negative mass. Usual causes are an edit by hand, an exporter that subtracts a hole, and a
+    "correction" of the total mass of several links.
 
     If the link moves:
 

@@ -44,7 +44,8 @@ class InertiaBeyondGeometry(Rule):
     minus the moment about the direction, divided by the mass. The rule examines thirteen directions (the
     link's axes and diagonals), and the three principal directions. For example, this bound finds a plate with
     the tensor of a block. Shapes are often drawn without the motor inside. So the rule widens the hull by a
-    hundredth of its diagonal, and reports a root mean square only if it is more than a tenth above the bound.
+    hundredth of its diagonal. It reports a root mean square only if this is more than a tenth above the
+    bound.
 
     Usual causes:
 
@@ -379,9 +380,10 @@ _MICROGRAM = 1e-9
 class MassNegligible(Rule):
     """DX518 mass-negligible: A link has a mass below a microgram, which no part of a robot has.
 
-    A screw has a gram, and a grain of sand has a milligram. Masses such as 1e-10 or 1e-15 kg have two causes:
-    an importer that refused a link without mass, or a computation with rounding errors whose exact result is
-    zero. In example-robot-data the smallest mass that is not zero is 1e-9 kg, exactly a microgram.
+    A screw has a gram, and a grain of sand has a milligram. Masses such as 1e-10 or 1e-15 kg have two causes.
+    Either an importer refused a link without mass. Or the mass is the rounding error of a computation whose
+    exact result is zero. In example-robot-data the smallest mass that is not zero is 1e-9 kg, exactly a
+    microgram.
 
     Engines accept small masses. Only MuJoCo 4.0.0 refuses a moving body below 1e-15 kg. If a joint carries
     only a link of such a mass, a very small torque causes an acceleration of millions of rad/s^2. So a

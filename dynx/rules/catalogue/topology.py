@@ -66,9 +66,9 @@ class FloatingJointAtRoot(EditingRule):
     """DX211 floating-joint-at-root: A floating joint below an empty root specifies a floating base in the
     file.
 
-    Some files describe a floating robot in this way: the root is a link ``world`` without inertia, and a
-    joint of type ``floating`` connects the robot to this link. But the call that loads a file also states
-    whether the base floats.
+    In some files of floating robots the root is a link ``world`` without inertia. A joint of type
+    ``floating`` connects the robot to this link. But the call that loads a file also states whether the base
+    floats.
 
     - PyBullet 3.2.7 makes the joint fixed, and prints one line on stdout. Then ``useFixedBase`` decides.
     - Pinocchio 4.1 gives the joint seven coordinates. ``JointModelFreeFlyer`` as a root joint gives seven
@@ -189,10 +189,10 @@ class LoopJoint(EditingRule):
     - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore the element without a warning, and load the open
       tree. dynx does the same, with a note.
 
-    What to do: close the loop in your program, by a constraint of your engine (``createConstraint`` in
-    PyBullet, ``<equality>`` in MJCF, a ball or weld constraint in Drake and Pinocchio). ``dynx doctor --fix``
-    removes the element, so that all engines load the open tree. ``--choose DX220=keep`` keeps the element for
-    programs that read it; Drake then refuses the file.
+    What to do: close the loop in your program by a constraint of your engine. This is ``createConstraint`` in
+    PyBullet, ``<equality>`` in MJCF, and a ball or weld constraint in Drake and Pinocchio.
+    ``dynx doctor --fix`` removes the element, so that all engines load the open tree. ``--choose DX220=keep``
+    keeps the element for programs that read it; Drake then refuses the file.
     """
 
     stage = "reading"
