@@ -69,9 +69,9 @@ class TwinsDiffer(Rule):
 
     **Distances of the joints from their parents.** The rule compares them under three conditions: the joints
     rotate, the parents are one link or twins by name, and masses (to 1 %), moments and centres of mass are
-    alike. It reports distances that differ by more than 1 % and by more than 1 mm. There is one exception:
-    the twins lie about one plane, and this plane contains the centre of mass of the parent but not the origin
-    of the parent's frame.
+    alike. It reports distances that differ by more than 1 % and by more than 1 mm. It reports nothing if the
+    twins lie about one plane that contains the centre of mass of the parent, but not the origin of the
+    parent's frame.
 
     **Limits.** The rule reports limits of effort and velocity that differ by more than 1 %. It reports ranges
     whose widths differ by more than 1 % and by more than 0.01 rad or m. It leaves out mimic joints.
