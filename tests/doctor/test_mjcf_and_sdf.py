@@ -7,6 +7,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import dynx
@@ -14,7 +15,7 @@ from dynx.agreement.tolerances import BAR
 from dynx.doctor.diagnosis import compare_as_loaded, diagnose, open_case
 from dynx.doctor.examination import EngineProcess, EngineTask, Examiner, temporary_document
 from dynx.engines.mujoco.as_loaded import LoadedMujoco
-from dynx.loaded import installed_engines
+from dynx.loaded import installed_engines, load_as
 from dynx.model import Model
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, all_rules
@@ -261,3 +262,32 @@ def test_shapes_of_one_link_with_one_name_get_names_of_their_own() -> None:
     text = remedy.case.source.text
     assert [text.count(f'"{name}"') for name in ("v", "v_2", "v_3")] == [1, 1, 1]
     assert not rule.detect(remedy.case)
+
+
+def test_links_of_static_models_have_no_moments_that_an_engine_could_lose() -> None:
+    text = trap_case("DX701").source.text
+    ground = '<model name="ground"><static>1</static><link name="plate"/></model>'
+    inner = text[text.index("<model") : text.rindex("</sdf>")]
+    world = text.replace(inner, f'<world name="w">{inner}{ground}</world>')
+    alone, beside = (find_rule("DX701").detect(Case(XmlSource(each))) for each in (text, world))
+    assert [each.link for each in beside] == [each.link for each in alone]
+
+
+def test_pybullet_finds_a_robot_without_joints_beside_a_floor(tmp_path: Path) -> None:
+    """Its FD has the forces of the floor, unless the call of DX620 switches contacts off."""
+    pytest.importorskip("pybullet")
+    path = tmp_path / "crate.xml"
+    path.write_text(
+        '<mujoco model="crate"><worldbody><geom type="plane" size="9 9 9"/><body name="crate"><freejoint/>'
+        '<geom type="box" size="0.3 0.3 0.3" mass="2"/></body></worldbody></mujoco>'
+    )
+    model = dynx.load(path)
+    q, zero = model.neutral(), np.zeros(model.nv)
+    wanted = dynx.backend("reference", model).forward_dynamics(q, zero, zero)
+    with load_as("pybullet", path, model) as pushed:
+        (depth,) = pushed.contacts(q).values()
+        assert depth == pytest.approx(0.3, abs=1e-6)
+        assert abs(pushed.forward_dynamics(q, zero, zero) - wanted).max() > 1.0
+    with load_as("pybullet", path, model, ["pybullet.no_contacts"]) as free:
+        assert not free.contacts(q)
+        np.testing.assert_allclose(free.forward_dynamics(q, zero, zero), wanted, atol=1e-12)

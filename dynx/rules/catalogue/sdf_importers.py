@@ -56,10 +56,10 @@ class InertiaFromShapesOfSdf(CallingRule):
     per_joint = False
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Yield links with a mass, but for a file in which all moments are those of boxes."""
+        """Yield links that may move, but for a file in which all moments are those of boxes."""
         for link in _parts(case, "link"):
             # A link without an inertial has 1 kg and 1 kg m^2 by the format.
-            if not _is_box(case, link):
+            if not _is_box(case, link) and not _is_static(case, link):
                 yield _found(link, link.first("inertial") or link, "the link has moments of its own")
 
 
@@ -77,6 +77,17 @@ def _is_box(case: Case, link: SourceElement) -> bool:
     held = [inertial.ixx, inertial.iyy, inertial.izz]
     close = all(abs(one - other) <= 1e-12 * max(held) for one, other in zip(wanted, held, strict=True))
     return close and not any((inertial.ixy, inertial.ixz, inertial.iyz))
+
+
+def _is_static(case: Case, link: SourceElement) -> bool:
+    """Check whether a link is of a model that never moves, whose inertia nothing uses."""
+    around = link.parent
+    while around is not None:
+        static = around.first("static") if around.tag == "model" else None
+        if static is not None and _is_true(case, static):
+            return True
+        around = around.parent
+    return False
 
 
 def _is_true(case: Case, element: SourceElement) -> bool:
