@@ -19,11 +19,11 @@ HEAD = """<!-- Written by docs/write_rules.py from the classes in dynx/rules/cat
 
 # Why engines differ on a file
 
-`dynx doctor` checks these rules. Each rule describes one cause for which engines differ on a robot file, or
-one bad practice. Rules have two kinds:
+`dynx doctor` checks these rules. Each rule describes one reason why engines differ on a robot file, or one
+bad practice. Rules have two kinds:
 
 - A *difference* makes an engine return another result, or makes an engine refuse the file.
-- A *practice* is bad practice, or concerns one engine, without a measurable difference.
+- A *practice* is bad practice, or a property of one engine, that causes no measurable difference.
 
 Each rule names the versions of the engines with which it was measured. Its last line links a small robot
 file that shows the cause. `dynx explain DX101` prints the text of a rule.
