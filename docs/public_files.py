@@ -74,12 +74,12 @@ the results of one day each. Their rows mean:
 | refused by all | refused files that all engines refuse too |
 | unexplained | files with a difference between engines whose cause dynx did not find |
 | other coordinates | repaired files that have more or fewer coordinates than the original |
-| changed, not reported | repaired files in which the parser reads other values than in the original; the report is silent |
-| changed, reported | repaired files in which the parser reads other values, and the report says so |
+| changed, not reported | repaired files in which the parser reads other values; the report omits this |
+| changed, reported | repaired files in which the parser reads other values; the report says so |
 | alike within 1e-9 | repaired files that all used engines load alike within 1e-9, in processes without dynx |
 | fine: alike within 1e-12 | files with a fine repair that all used engines load alike within 1e-12 |
 | printed calls | calls of engines that run without dynx, of all calls that dynx prints |
-| changed files | files that the repair changed |
+| changed files | files whose text the repair changed |
 | lines of a file | lines that the repair changed in a file (median) |
 | digits | digits in a new number (median) |
 
