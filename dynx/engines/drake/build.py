@@ -47,11 +47,14 @@ from dynx.engines.drake.materials import APPROXIMATIONS, MODELS, Copies, copies_
 from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism
 from dynx.model.geometry import Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Shape, Sphere
-from dynx.model.mechanism import ROOT
+from dynx.model.mechanism import ROOT, Body
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import cross, skew
 from dynx.steppers.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout
+
+_ORIGIN: Floats = np.zeros(3)
 
 MAX_RATIO = 1e150
 """Bound on a length [m] and on a squared radius of gyration [m^2], above which products may overflow."""
@@ -97,10 +100,9 @@ def build_plant(mechanism: Mechanism) -> BuiltPlant:
     joints: list[Any] = []
     for index, body in enumerate(mechanism.bodies):
         carrier = bodies[body.parent - ROOT].body_frame()
-        before = plant.AddFrame(FixedOffsetFrame(f"before:{index}", carrier, drake_pose(body.R, body.p)))
+        before, after, axis = joint_frames(plant, f"{index}", carrier, bodies[index + 1].body_frame(), body)
         kind = RevoluteJoint if body.revolute else PrismaticJoint
-        moved = bodies[index + 1].body_frame()
-        joints.append(plant.AddJoint(kind(f"{index}", before, moved, np.array(body.axis))))
+        joints.append(plant.AddJoint(kind(f"{index}", before, after, axis)))
     frames = []
     for index, frame in enumerate(mechanism.frames):
         carrier = bodies[frame.body - ROOT].body_frame()
@@ -125,6 +127,32 @@ def build_plant(mechanism: Mechanism) -> BuiltPlant:
         np.array(placements, dtype=float),
         counterweighted,
     )
+
+
+def joint_frames(
+    plant: Any, name: str, carrier: Any, moved: Any, body: Body, shift: Floats = _ORIGIN
+) -> tuple[Any, Any, Floats]:
+    """Add the two frames of a joint; return them with the axis (3,) in both.
+
+    Drake 1.51 takes an axis within 1.8e-8 rad of x, y or z for that one. Such an axis becomes x, y or z of
+    frames that are turned by the deviation.
+    """
+    axis, R = np.asarray(body.axis, dtype=float), np.eye(3)
+    nearest = np.eye(3)[np.argmax(axis)]
+    deviation = cross(nearest, axis)
+    if np.max(axis) > 0.0 and 0.0 < np.max(np.abs(deviation)) < NEAR_AXIS:
+        # Of this rotation, terms of second order are below rounding.
+        axis, R = nearest, np.eye(3) + skew(deviation)
+    R_before = np.asarray(body.R, dtype=float) @ R
+    before = FixedOffsetFrame(f"before:{name}", carrier, drake_pose(R_before, body.p + shift))
+    after = moved
+    if axis is nearest:
+        after = plant.AddFrame(FixedOffsetFrame(f"after:{name}", moved, drake_pose(R, _ORIGIN)))
+    return plant.AddFrame(before), after, axis
+
+
+NEAR_AXIS = 2e-8
+"""Component of an axis across a coordinate axis below which the frames of the joint are turned."""
 
 
 def inertia_parts(inertia: RigidInertia) -> list[Any]:
@@ -315,14 +343,12 @@ def _add_robot(
     for index, moving in enumerate(mechanism.bodies):
         name = f"r{number}.{index}"
         parent = carriers[Owner(number, moving.parent)]
-        p = moving.p + parent.T[:3, 3]
-        before = plant.AddFrame(
-            FixedOffsetFrame(f"before:{name}", parent.body.body_frame(), drake_pose(moving.R, p))
-        )
         body = plant.AddRigidBody(name, _inertia(moving.inertia, robot))
+        carrier, shift = parent.body.body_frame(), parent.T[:3, 3]
+        before, after, axis = joint_frames(plant, name, carrier, body.body_frame(), moving, shift)
         kind = RevoluteJoint if moving.revolute else PrismaticJoint
         limits = robot.lower[index], robot.upper[index], robot.damping[index]
-        joints.append(plant.AddJoint(kind(name, before, body.body_frame(), np.array(moving.axis), *limits)))
+        joints.append(plant.AddJoint(kind(name, before, after, axis, *limits)))
         if robot.stiffness[index]:
             spring = RevoluteSpring if moving.revolute else PrismaticSpring
             plant.AddForceElement(spring(joints[-1], robot.spring_reference[index], robot.stiffness[index]))

@@ -139,3 +139,23 @@ def test_importing_says_nothing_and_leaves_the_log_as_it_was() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+@pytest.mark.parametrize("deviation", [1e-6, 1.9e-8, 1e-8, 1e-10, 1e-13])
+def test_an_axis_near_a_coordinate_axis_keeps_its_direction(deviation: float, kind: JointType) -> None:
+    """Drake alone takes the coordinate axis (DX226)."""
+    root = Inertial(2.0, Pose((0.3, 0.2, 0.1)), 1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+    links = [Link(name, root) for name in ("root", "first", "second", "third")]
+    axes = ((deviation, -deviation, 1.0), (0.3 * deviation, 1.0, 0.0), (-1.0, deviation, 0.0))
+    joints = [
+        Joint(
+            f"joint {k}", kind, links[k].name, links[k + 1].name, Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)), axis
+        )
+        for k, axis in enumerate(axes)
+    ]
+    model = Model.build("near axes", links, joints, gravity=(0.3, -0.7, -9.81))
+    sample = motion(model)
+    expected = all_quantities(ReferenceBackend(model), *sample)
+    for quantity, result in all_quantities(DrakeBackend(model), *sample).items():
+        assert_close(result, expected[quantity], 10.0, what=quantity)
