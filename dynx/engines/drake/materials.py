@@ -60,13 +60,13 @@ SETTINGS: Mapping[str, Setting] = {
     "stiffness": Setting(1e6, "stiffness of every shape in point contact [N/m]", 1e-3),
     "relaxation_time": Setting(
         0.01,
-        "relaxation time of contacts [s], which sets their damping, if `contact_approximation` is 'sap'",
+        "with `contact_approximation` 'sap': relaxation time [s], which sets the damping of contacts",
         needs=("contact_approximation", ("sap",)),
     ),
     "dissipation": Setting(
         10.0,
-        "damping of contacts by the law of Hunt and Crossley [s/m], if `contact_approximation` is 'lagged' "
-        "or 'similar'",
+        "with `contact_approximation` 'lagged' or 'similar': damping of contacts [s/m] by the law of Hunt "
+        "and Crossley",
         needs=("contact_approximation", ("lagged", "similar")),
     ),
     "stiction_tolerance": Setting(1e-4, "sliding speed below which shapes count as sticking [m/s]", 1e-9),

@@ -45,8 +45,8 @@ SETTINGS: Mapping[str, Setting] = {
     ),
     "impratio": Setting(
         100.0,
-        "MuJoCo's impratio: hardness of friction relative to that of the normal force; a larger value "
-        "reduces the creep of sticking contacts",
+        "MuJoCo's impratio: hardness of friction divided by hardness of the normal force; with a larger "
+        "value sticking contacts creep less",
         1e-6,
     ),
     "noslip_iterations": Setting(0, "iterations of the solver that removes slip", 0),
@@ -79,7 +79,7 @@ SETTINGS: Mapping[str, Setting] = {
     ),
     "joint_friction_impedance": Setting(
         0.999,
-        "MuJoCo's impedance of joint friction; the nearer to 1, the less a sticking joint creeps",
+        "MuJoCo's impedance of joint friction; near 1 a sticking joint creeps least",
         0.0001,
         0.9999,
     ),

@@ -118,28 +118,32 @@ SETTINGS = {
         100, "largest number of iterations of the constraint solver", least=1, most=1e6
     ),
     "residual_threshold": Setting(1e-7, "squared residual at which the solver stops iterating"),
-    "erp": Setting(0.2, "share of the error of constraints and joint limits removed in a step", most=1.0),
-    "contact_erp": Setting(0.05, "share of a penetration removed in a step", most=1.0),
+    "erp": Setting(
+        0.2, "share of the error of constraints and joint limits that each step removes", most=1.0
+    ),
+    "contact_erp": Setting(0.05, "share of a penetration that each step removes", most=1.0),
     "friction_anchors": Setting(
         False,
-        "whether the engine pulls sticking contacts back to the point where they formed; this also slows "
+        "True: the engine pulls sticking contacts back to the point where they formed; this also slows "
         "rolling bodies",
     ),
     "friction_erp": Setting(
         0.2,
-        "with `friction_anchors`: share of the drift of a sticking contact removed in a step",
+        "with `friction_anchors`: share of the drift of a sticking contact that each step removes",
         most=1.0,
         needs=("friction_anchors", (True,)),
     ),
-    "cone_friction": Setting(True, "whether friction is limited by a cone, not by a pyramid"),
+    "cone_friction": Setting(True, "True: a cone limits friction; False: a pyramid limits friction"),
     "restitution_speed": Setting(0.05, "least approach speed [m/s] of an impact that rebounds"),
     "rebound_time_constant": Setting(
-        0.2, "time constant [s] of the removal of penetrations between surfaces that rebound", most=1e6
+        0.2, "time constant [s] at which penetrations between rebounding surfaces vanish", most=1e6
     ),
     "contact_distance": Setting(0.02, "distance [m] below which contact points are kept"),
-    "contact_slop": Setting(1e-5, "depth [m] of penetrations that the solver leaves as they are", most=1.0),
+    "contact_slop": Setting(
+        1e-5, "largest depth [m] of a penetration that the solver does not remove", most=1.0
+    ),
     "mesh_margin": Setting(
-        0.0, "distance [m] by which the hull of a mesh or an ellipsoid is enlarged", most=1.0
+        0.0, "distance [m] by which the hulls of meshes and ellipsoids are enlarged", most=1.0
     ),
     "constraint_force": Setting(
         1e6, "largest force [N] or moment [N m] of welds and point-to-point constraints", most=1e12
