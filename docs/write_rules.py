@@ -62,7 +62,7 @@ def page() -> str:
 
 
 def _table() -> str:
-    rows = ["| rule | kind | engines | |", "|---|---|---|---|"]
+    rows = ["| rule | kind | engines | what the rule reports |", "|---|---|---|---|"]
     for rule in all_rules():
         engines = ", ".join(rule.engines) or "-"
         link = f"[{rule.id}](#{rule.id.lower()}) {rule.name}"
