@@ -2,14 +2,16 @@
 
 - *slides*: random boxes, cylinders and convex hulls slide on level ground until they rest. By Coulomb's law
   they stop after v^2 / (2 mu g) - v h / 2 in steps of h, do not tilt, and keep their heading. With n whole
-  steps and a part f of one until rest, steps of h end mu g h^2 f (1 - f) / 2 before that.
+  steps and a part f of one until rest, the sum over the steps is mu g h^2 f (1 - f) / 2 more than that.
 - *rest*: cubes on slopes below the angle of friction, stacks of five, 1 kg under 1,000 kg and the reverse.
   Their forces sum to the weight, and they do not creep.
 - *work*: random scenes with friction and restitution. In each step the work of the impulses of contacts and
   limits, x . (v- + v+) / 2, is at most zero, relative to the kinetic energy. The energy grows by no more than
   the integrator adds without contacts, but where a step takes back an overlap.
 
-Prints the worst case of each, and exits with 1 if one exceeds its bar.
+Prints the largest error of each law, and exits with 1 if one exceeds its bar. Each case has random numbers
+of its own, by the seed and its number. With ``--record FILE`` each case that is done stands in the file: an
+interrupted survey continues there, and after Ctrl-C it prints what it has.
 """
 
 from __future__ import annotations
@@ -18,13 +20,14 @@ import argparse
 import math
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.progress import Record, tell
 from dynx.engines.own import impulses
 from dynx.engines.own.impulses import Island, WarmStart
 from dynx.engines.own.parts import OwnBody
@@ -41,11 +44,11 @@ G = 9.81
 MOST_OF_TIPPING = 0.97
 """Largest friction of a body that slides, relative to the one at which it tips, and to 1."""
 
-TOGETHER = 20
-"""Number of bodies that slide in one world."""
+BETWEEN_REPORTS = 1.0
+"""Simulated time [s] between two lines of progress of a case."""
 
-FAR = 1e3
-"""Distance of these bodies at the start [m]."""
+SLIDE, SCENE = 1, 2
+"""Numbers in the seeds of slides and random scenes."""
 
 BARS = {
     "tilt [rad]": math.radians(1.0),
@@ -62,12 +65,38 @@ BARS = {
 """Largest values that pass."""
 
 
-class Measured(NamedTuple):
-    """A measured value, and the case in which it was found."""
+Errors = dict[str, float]
+"""Largest value of each error of a case, by its name in `BARS`."""
 
-    value: float
+
+class Case(NamedTuple):
+    """A case of the survey, before it is measured."""
+
     name: str
-    case: str
+    """Name that no case with other numbers has."""
+    measure: Callable[[], tuple[str, Errors]]
+    """Returns what the case is, and its errors."""
+
+    def measured(self) -> MeasuredCase:
+        """Measure the case."""
+        return MeasuredCase(self.name, *self.measure())
+
+
+@dataclass(frozen=True)
+class MeasuredCase:
+    """A case with its errors."""
+
+    name: str
+    what: str
+    errors: Errors
+
+
+def run(world: World, duration: float, what: str) -> None:
+    """Run a world, and write on the terminal how far it is."""
+    end = world.time + duration
+    while world.time < end - 0.5 * world.dt:
+        tell(f"{what}: {world.time:.0f} of {duration:.0f} s")
+        world.run(min(BETWEEN_REPORTS, end - world.time))
 
 
 # -- slides -----------------------------------------------------------------------------------
@@ -135,45 +164,43 @@ def slider(rng: np.random.Generator, folder: Path) -> Slider:
     return Slider(body, friction, speed, heading, tipping)
 
 
-def slides(count: int, rng: np.random.Generator) -> Iterator[Measured]:
-    """Yield the errors of random slides."""
-    with tempfile.TemporaryDirectory() as folder:
-        sliders = [slider(rng, Path(folder)) for _ in range(count)]
-        # Worlds of bodies that slide for similar times, each far from the others, take less time.
-        sliders.sort(key=lambda each: each.speed / each.friction)
-        for k in range(0, count, TOGETHER):
-            yield from _slides_of_world(sliders[k : k + TOGETHER], float(rng.uniform(0.5e-3, 5e-3)))
+def slides(count: int, seed: int) -> Iterator[Case]:
+    """Yield random slides."""
+    for k in range(count):
+
+        def measure(k: int = k) -> tuple[str, Errors]:
+            rng = np.random.default_rng((seed, SLIDE, k))
+            with tempfile.TemporaryDirectory() as folder:
+                chosen = slider(rng, Path(folder))
+                return _slide(chosen, float(rng.uniform(0.5e-3, 5e-3)))
+
+        yield Case(f"slide {seed}.{k}", measure)
 
 
-def _slides_of_world(sliders: Sequence[Slider], h: float) -> Iterator[Measured]:
-    bodies = [
-        replace(
-            each.body, name=str(k), pose=replace(each.body.pose, xyz=(FAR * k, 0.0, each.body.pose.xyz[2]))
-        )
-        for k, each in enumerate(sliders)
-    ]
-    scene = Scene("slides", bodies=(ground(material=Material(friction=1.0)), *bodies))
+def _slide(chosen: Slider, h: float) -> tuple[str, Errors]:
+    body, friction, speed, heading, tipping = chosen
+    steps = speed / (friction * G * h)
+    what = (
+        f"{type(body.shapes[0].shape).__name__}, mu {friction:.3g}, {friction / tipping:.2g} of tipping, "
+        f"{speed:.3g} m/s, h {h:.2g} s, {steps:.3g} steps"
+    )
+    scene = Scene("slide", bodies=(ground(material=Material(friction=1.0)), body))
     with World(scene, ENGINE, h) as world:
-        world.run(max(each.speed / (each.friction * G) for each in sliders) + 3.0 * h)
-        state = world.state
-    for body, (_, friction, speed, heading, tipping) in zip(bodies, sliders, strict=True):
-        kind = type(body.shapes[0].shape).__name__
-        case = (
-            f"{kind}, mu {friction:.3g}, {friction / tipping:.2g} of tipping, {speed:.3g} m/s, h {h:.2g} s, "
-            f"{speed / (friction * G * h):.3g} steps"
-        )
-        T, begin = state.bodies[body.name].T_world_body, body.pose.matrix
-        moved, turned = T[:3, 3] - begin[:3, 3], begin[:3, :3].T @ T[:3, :3]
-        yield Measured(math.acos(min(1.0, T[2, 2])), "tilt [rad]", case)
-        yaw = abs(math.atan2(turned[1, 0], turned[0, 0]))
-        drift = abs(math.remainder(math.atan2(moved[1], moved[0]) - heading, 2.0 * math.pi))
-        yield Measured(max(yaw, drift), "change of heading [rad]", case)
-        found = math.hypot(moved[0], moved[1])
-        wanted = speed**2 / (2.0 * friction * G) - 0.5 * speed * h
-        yield Measured(abs(found - wanted) / wanted, "stopping distance, relative error", case)
-        f = speed / (friction * G * h) % 1.0
-        in_steps = wanted - 0.5 * friction * G * h**2 * f * (1.0 - f)
-        yield Measured(abs(found - in_steps) / wanted, "stopping distance in steps, relative error", case)
+        run(world, (steps + 3.0) * h, what)
+        T, begin = world.state.bodies[body.name].T_world_body, body.pose.matrix
+    moved, turned = T[:3, 3] - begin[:3, 3], begin[:3, :3].T @ T[:3, :3]
+    yaw = abs(math.atan2(turned[1, 0], turned[0, 0]))
+    drift = abs(math.remainder(math.atan2(moved[1], moved[0]) - heading, 2.0 * math.pi))
+    distance = math.hypot(moved[0], moved[1])
+    wanted = speed**2 / (2.0 * friction * G) - 0.5 * speed * h
+    f = steps % 1.0
+    in_steps = wanted + 0.5 * friction * G * h**2 * f * (1.0 - f)
+    return what, {
+        "tilt [rad]": math.acos(min(1.0, T[2, 2])),
+        "change of heading [rad]": max(yaw, drift),
+        "stopping distance, relative error": abs(distance - wanted) / wanted,
+        "stopping distance in steps, relative error": abs(distance - in_steps) / in_steps,
+    }
 
 
 # -- rest -------------------------------------------------------------------------------------
@@ -205,23 +232,32 @@ def resting(share: float) -> Iterator[tuple[str, Scene, float]]:
         yield f"stack of {masses} kg", Scene("s", bodies=cubes(masses, material)), 60.0 * share
 
 
-def rests(share: float, h: float) -> Iterator[Measured]:
-    """Yield the errors of bodies at rest in steps of `h` [s]."""
-    for case, scene, duration in resting(share) if share > 0.0 else ():
-        with World(scene, ENGINE, h) as world:
-            world.run(duration)
-            state, force = world.state, sum(c.force for c in world.contacts("ground"))
-        weight = sum(body.mass or 0.0 for body in scene.bodies) * np.array(scene.gravity)
-        off = float(np.linalg.norm(force - weight) / np.linalg.norm(weight))
-        yield Measured(off, "sum of forces, relative to the weight", case)
-        moving = [body for body in scene.bodies if not body.fixed]
-        creep = max(float(np.abs(state.bodies[body.name].twist).max()) for body in moving)
-        yield Measured(creep, "creep [m/s]", case)
-        sunk = max(
-            float(np.abs(state.bodies[body.name].T_world_body[:3, 3] - body.pose.matrix[:3, 3]).max())
-            for body in moving
-        )
-        yield Measured(sunk, "sinking [m]", case)
+def rests(share: float, h: float) -> Iterator[Case]:
+    """Yield bodies at rest in steps of `h` [s]."""
+    for what, scene, duration in resting(share) if share > 0.0 else ():
+
+        def measure(what: str = what, scene: Scene = scene, duration: float = duration) -> tuple[str, Errors]:
+            return what, _rest(what, scene, duration, h)
+
+        yield Case(f"{what}, {duration:g} s in steps of {h:g} s", measure)
+
+
+def _rest(what: str, scene: Scene, duration: float, h: float) -> Errors:
+    with World(scene, ENGINE, h) as world:
+        run(world, duration, what)
+        state, force = world.state, sum(c.force for c in world.contacts("ground"))
+    weight = sum(body.mass or 0.0 for body in scene.bodies) * np.array(scene.gravity)
+    moving = [body for body in scene.bodies if not body.fixed]
+    poses = {body.name: state.bodies[body.name].T_world_body[:3, 3] for body in moving}
+    return {
+        "sum of forces, relative to the weight": float(
+            np.linalg.norm(force - weight) / np.linalg.norm(weight)
+        ),
+        "creep [m/s]": max(float(np.abs(state.bodies[body.name].twist).max()) for body in moving),
+        "sinking [m]": max(
+            float(np.abs(poses[body.name] - body.pose.matrix[:3, 3]).max()) for body in moving
+        ),
+    }
 
 
 # -- work -------------------------------------------------------------------------------------
@@ -341,37 +377,66 @@ def collision(rng: np.random.Generator) -> Scene:
     return Scene("collision", bodies=(ground(material=Material(0.8, 0.01, 0.005, 0.5)), *bodies))
 
 
-def works(count: int, rng: np.random.Generator) -> Iterator[Measured]:
-    """Yield the work of impulses and the growth of energy in some steps of random scenes."""
+def works(count: int, seed: int) -> Iterator[Case]:
+    """Yield random scenes with impacts."""
     for k in range(count):
-        with EnergyOfSteps() as measured, World(collision(rng), ENGINE, 2e-3) as world:
-            world.step(40)
-        yield Measured(measured.work, "work, relative to the kinetic energy", f"collision {k}")
-        yield Measured(measured.growth, "growth of energy, relative to the kinetic energy", f"collision {k}")
-        yield Measured(measured.residual, "residual of a step [m/s]", f"collision {k}")
+
+        def measure(k: int = k) -> tuple[str, Errors]:
+            scene = collision(np.random.default_rng((seed, SCENE, k)))
+            with EnergyOfSteps() as measured, World(scene, ENGINE, 2e-3) as world:
+                world.step(40)
+            return f"scene {seed}.{k}", {
+                "work, relative to the kinetic energy": measured.work,
+                "growth of energy, relative to the kinetic energy": measured.growth,
+                "residual of a step [m/s]": measured.residual,
+            }
+
+        yield Case(f"scene {seed}.{k}", measure)
+
+
+def report(cases: Sequence[MeasuredCase]) -> bool:
+    """Print the largest value of each error; return whether one exceeds its bar."""
+    failed = False
+    for name, bar in BARS.items():
+        found = [(each.errors[name], each.what) for each in cases if name in each.errors]
+        if found:
+            value, what = max(found)
+            over = sum(not error <= bar for error, _ in found)
+            beyond = f", {over} above {bar:.2g}" if over else ""
+            print(f"{name:50s} {value:9.2e} of {len(found)} cases{beyond} ({what})")
+            failed = failed or over > 0
+    return failed
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure, print the worst of each law, and return the exit code."""
+    """Measure, print the largest errors, and return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--slides", type=int, default=1000, help="number of bodies that slide")
     parser.add_argument("--scenes", type=int, default=10_000, help="number of random scenes with impacts")
     parser.add_argument("--rest", type=float, default=1.0, help="share of 15 s on slopes and 60 s of stacks")
     parser.add_argument("--step", type=float, default=1e-3, help="step of bodies at rest [s]")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0, help="seed of slides and scenes, which have numbers")
+    parser.add_argument("--record", type=Path, help="file of the cases that are done, from which to continue")
     given = parser.parse_args(arguments)
-    rng = np.random.default_rng(given.seed)
-    worst: dict[str, Measured] = {}
-    over: dict[str, int] = {}
-    count: dict[str, int] = {}
-    for each in (*slides(given.slides, rng), *rests(given.rest, given.step), *works(given.scenes, rng)):
-        worst[each.name] = max(worst.get(each.name, each), each)
-        count[each.name] = count.get(each.name, 0) + 1
-        over[each.name] = over.get(each.name, 0) + (not each.value <= BARS[each.name])
-    for name, found in worst.items():
-        beyond = f", {over[name]} above {BARS[name]:.2g}" if over[name] else ""
-        print(f"{name:50s} {found.value:9.2e} of {count[name]} cases{beyond} ({found.case})")
-    return int(any(over.values()))
+    cases = [
+        *slides(given.slides, given.seed),
+        *rests(given.rest, given.step),
+        *works(given.scenes, given.seed),
+    ]
+    record: Record[MeasuredCase] = Record(MeasuredCase, lambda each: each.name, given.record)
+    found: list[MeasuredCase] = []
+    interrupted = False
+    try:
+        for case in cases:
+            tell(f"{len(found)} of {len(cases)} cases: {case.name}")
+            found.append(record.get(case.name, case.measured))
+    except KeyboardInterrupt:
+        interrupted = True
+    tell("")
+    if interrupted:
+        print(f"interrupted after {len(found)} of {len(cases)} cases")
+    failed = report(found)
+    return 130 if interrupted else int(failed)
 
 
 if __name__ == "__main__":
