@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.surveys.contact_laws import BARS, main, resting, slider
+from benchmarks.surveys import contact_laws
+from benchmarks.surveys.contact_laws import BARS, Case, main, resting, slider
 from dynx.distance import PlacedSolid, contact_points
 from dynx.model.geometry import Plane
 
@@ -16,6 +17,35 @@ def test_some_cases_keep_every_law(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--slides", "1", "--scenes", "1", "--rest", "0.0005"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split("  ")[0] for line in lines] == list(BARS)
+
+
+def test_an_interrupted_survey_keeps_its_cases_and_continues(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record = tmp_path / "laws.jsonl"
+    arguments = ["--slides", "0", "--scenes", "3", "--rest", "0", "--record", str(record)]
+    measured, count = Case.measured, 0
+
+    def interrupted(case: Case) -> contact_laws.MeasuredCase:
+        nonlocal count
+        count += 1
+        if count == 3:
+            raise KeyboardInterrupt
+        return measured(case)
+
+    monkeypatch.setattr(Case, "measured", interrupted)
+    assert main(arguments) == 130
+    assert capsys.readouterr().out.startswith("interrupted after 2 of 3 cases")
+    assert len(record.read_text().splitlines()) == 2
+    assert main(arguments) == 0
+    assert count == 4
+    assert "of 3 cases" in capsys.readouterr().out
+    whole = [*arguments[:-2]]
+    monkeypatch.setattr(Case, "measured", measured)
+    assert main(whole) == 0
+    alone = capsys.readouterr().out
+    assert main(arguments) == 0
+    assert capsys.readouterr().out == alone
 
 
 def test_no_body_that_slides_would_tip(tmp_path: Path) -> None:
