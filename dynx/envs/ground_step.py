@@ -412,7 +412,8 @@ class GroundLanes(TaskLanes):
             beyond = self.arrays["beyond"][part, 0]
             while begin < end - 1:
                 steps.run(begin, begin + 1)
-                if beyond.max() > 0.0:
+                # Not by the largest: that of a lane that diverges is NaN.
+                if (beyond > 0.0).any():
                     self._stop_joints(part.start + np.flatnonzero(beyond > 0.0), begin)
                 begin += 1
         steps.run(begin, end)
