@@ -177,6 +177,21 @@ def _as_given(value: object) -> str:
     return shown(value) if isinstance(value, str) else escaped(value)
 
 
+class EndMotors(NamedTuple):
+    """Motors of one robot with the torque torque + kp (target - q) + kd (velocity - v) at the end of a step,
+    within +-max_force: arrays (n,) over the velocity coordinates of the joints, zero without such a motor."""
+
+    target: Floats
+    velocity: Floats
+    kp: Floats
+    kd: Floats
+    torque: Floats
+    max_force: Floats
+
+
+NO_MOTORS: Mapping[int, EndMotors] = MappingProxyType({})
+
+
 class Forces(NamedTuple):
     """Everything that acts in the steps of one call: what is not given does not act.
 
@@ -193,6 +208,8 @@ class Forces(NamedTuple):
     commands: Mapping[int, EngineCommand] = NO_COMMANDS
     """Commands to the engine's own motors by number of the robot, of classes in `Stepper.commands`. A mapping
     that is the same object as in the call before has the same commands."""
+    motors: Mapping[int, EndMotors] = NO_MOTORS
+    """Motors at the end of each step by number of the robot, for an engine that `solves_motors`."""
 
 
 NO_FORCES = Forces()

@@ -84,9 +84,13 @@ class RobotStep:
             return self.scheme(self.acceleration, q, v, tau, t)
         return self._step_in_modes(self.scheme, q, v, tau, t)
 
-    def motion(self, q: Floats, v: Floats, tau: Floats, t: float = 0.0) -> tuple[Floats, Floats | None]:
+    def motion(
+        self, q: Floats, v: Floats, tau: Floats, t: float = 0.0, added: Floats | None = None
+    ) -> tuple[Floats, Floats | None]:
         """Return the acceleration (nv,) of a step of semi-implicit Euler, and 1 for coordinates that move and
-        0 for those that stick (nv,); None where all move."""
+        0 for those that stick (nv,); None where all move. `added` (nv,) is inertia beside the armature."""
+        if added is not None:
+            return self._motion_with_inertia(q, v, self._loaded(q, v, tau, t), added)
         if self._is_free:
             return self.dynamics.forward_dynamics(q, v, tau), None
         if not self.sticks:
@@ -94,17 +98,30 @@ class RobotStep:
         a, moves = self.slowed(q, v, tau, t)
         return a, moves
 
-    def without_dry_friction(self, q: Floats, v: Floats, tau: Floats) -> tuple[Floats, Floats]:
+    def _motion_with_inertia(
+        self, q: Floats, v: Floats, tau: Floats, added: Floats
+    ) -> tuple[Floats, Floats | None]:
+        M, bias = self.dynamics.mass_matrix_and_bias(q, v)
+        M = M + np.diag(added)
+        if self.sticks:
+            a, moves = self._joints.step(M, bias, tau, v)
+            return a, moves
+        return solve_mass_matrix(M if self._armature is None else M + self._armature, tau - bias), None
+
+    def without_dry_friction(
+        self, q: Floats, v: Floats, tau: Floats, added: Floats | float = 0.0
+    ) -> tuple[Floats, Floats]:
         """Return the acceleration (nv,) of a step of semi-implicit Euler without dry friction, and the matrix
-        A (nv, nv) that impulses act on: M with armature and the damping of the step."""
+        A (nv, nv) that impulses act on: M with armature, the damping of the step and other `added` inertia
+        (nv,)."""
         M, bias = self.dynamics.mass_matrix_and_bias(q, v)
         rest = self._loaded(q, v, tau, 0.0) - bias
-        A, rest = damped_equation(M, rest, v, self._h, self._damping, self._inertia)
+        A, rest = damped_equation(M, rest, v, self._h, self._damping, self._inertia + added)
         return solve_mass_matrix(A, rest), A
 
-    def inertia(self, q: Floats) -> Floats:
-        """Return the matrix A (nv, nv) that impulses act on: M with armature and the damping of the step."""
-        A: Floats = self.dynamics.mass_matrix(q) + np.diag(self._inertia + self._h * self._damping)
+    def inertia(self, q: Floats, added: Floats | float = 0.0) -> Floats:
+        """Return the matrix A (nv, nv) that impulses act on, as `without_dry_friction` does."""
+        A: Floats = self.dynamics.mass_matrix(q) + np.diag(self._inertia + self._h * self._damping + added)
         return A
 
     def traced(self, record: RecordCall, q: Array, v: Array, tau: Array) -> MotionState:

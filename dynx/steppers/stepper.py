@@ -156,9 +156,16 @@ class Stepper(ABC):
         at its beginning."""
         return True
 
+    @property
+    def solves_motors(self) -> bool:
+        """True for an engine that takes motors whose law holds at the end of a step (`Forces.motors`), and
+        solves for it together with everything else that acts in the step."""
+        return False
+
     def motor_torque(self, robot: int) -> Floats | None:
-        """Return the torque (nv,) of the engine's own motors in the last step, for a robot with a command;
-        NaN for joints of which the engine does not report it. None for an engine without such motors."""
+        """Return the torque (nv,) of the engine's own motors in the last step, for a robot with a command or
+        with motors at the end of a step; NaN for joints of which the engine does not report it. None for an
+        engine without such motors."""
         return None
 
     # -- state --------------------------------------------------------------------------------

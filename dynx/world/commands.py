@@ -19,7 +19,7 @@ from dynx.errors import ArgumentError, ShapeError, UnknownNameError, Unsupported
 from dynx.model.numbers import checked_entries, real_array
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
-from dynx.steppers.forces import NO_COMMANDS, EngineCommand, ExternalForce, Forces
+from dynx.steppers.forces import NO_COMMANDS, NO_MOTORS, EndMotors, EngineCommand, ExternalForce, Forces
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.stepper import Feature, Stepper
 from dynx.world.motors import JointLaw, Motor, combine
@@ -132,6 +132,11 @@ class RobotLoads:
         return bool(self._motors) and not self._law.implicit
 
     @property
+    def end_motors(self) -> EndMotors | None:
+        """Motors whose law holds at the end of a step, for an engine that solves for it; None without any."""
+        return self._end_motors if self._motors and self._law.implicit else None
+
+    @property
     def law(self) -> tuple[JointLaw | None, Floats | None]:
         """Law of the motors, and 1 for the joints where it holds at the end of a step, else 0."""
         return (self._law, self._implicit_joints) if self._motors else (None, None)
@@ -171,6 +176,14 @@ class RobotLoads:
             self._ahead = implicit * self._h * law.kp
             self._inertia = implicit * self._h * (law.kd + self._h * law.kp)
             self._metric = np.diag(np.concatenate([np.zeros(self._base), self._inertia]))
+            self._end_motors = EndMotors(
+                law.target,
+                law.velocity,
+                implicit * law.kp,
+                implicit * law.kd,
+                implicit * law.torque,
+                np.where(implicit > 0.0, law.max_force, np.inf),
+            )
             self._saturates = bool(np.isfinite(law.max_force).any())
             joints = slice(self.model.nq - len(law.kp), None)
             far = (
@@ -205,12 +218,14 @@ class RobotLoads:
         v: Floats,
         tau: Floats | None,
         forces: Sequence[tuple[str, ExternalForce, float]],
+        *,
+        solved: bool = False,
     ) -> Floats:
         """Return the generalised force (nv,) in a step from q, v: `tau`, external forces on frames with their
-        shares of the step, motors."""
+        shares of the step, motors; with `solved` without `end_motors`, for which the engine solves."""
         total = self._pushed(q, tau, forces)
         if self._motors:
-            total = self._with_motors(q, v, total)
+            total = self._with_motors(q, v, total, solved=solved)
         return total if self.joints is None else self.joints.torque(q, v, total)
 
     def torque_beside_motors(
@@ -268,15 +283,18 @@ class RobotLoads:
         self.motor_torque = motor
         return motor
 
-    def _with_motors(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+    def _with_motors(self, q: Floats, v: Floats, tau: Floats, *, solved: bool) -> Floats:
         base = self._base
         rates = v[base:]
         motor = self._motor_torque(q[7:] if base else q, rates)
-        if self._law.implicit:
+        predicted = self._law.implicit and not solved
+        if predicted:
             motor = self._implicit(q, v, tau, motor - self._ahead * rates)
+        elif self._law.implicit:
+            motor = (1.0 - self._implicit_joints) * motor
         total: Floats = tau.copy()
         total[base:] += self._saturated(motor)
-        if self._law.implicit:
+        if predicted:
             self.motor_memory = (v, total)
         return total
 
@@ -391,6 +409,8 @@ class Commands:
         self._wrenches: Floats = self._no_wrench
         self._on_frames: dict[int, OnFrames] = {}
         self._engine_commands: Mapping[int, EngineCommand] = NO_COMMANDS
+        self._end_motors: Mapping[int, EndMotors] = NO_MOTORS
+        """Motors at the end of the last step for which the engine solved."""
         self._restored: Mapping[str, Floats] | None = None
         """Torques of robots in the step before the state was restored; None after the next step."""
         self.forget()
@@ -419,7 +439,7 @@ class Commands:
                 total += tau
         if loads.has_motors:
             total[len(total) - len(loads.motor_torque) :] += loads.motor_torque
-        if robot in self._engine_commands:
+        if robot in self._engine_commands or robot in self._end_motors:
             own = engine.motor_torque(robot)
             total += np.nan if own is None else own
         return total
@@ -476,7 +496,7 @@ class Commands:
         self._held = held
         if self._more_than_torques:
             self._more_than_torques = False
-            self._restored, self._engine_commands = None, NO_COMMANDS
+            self._restored, self._engine_commands, self._end_motors = None, NO_COMMANDS, NO_MOTORS
             for loads in self._loads:
                 loads.set_motors((), loads.changed_law(()))
             self._wrenches, self._on_frames = self._no_wrench, {}
@@ -497,6 +517,7 @@ class Commands:
         commands = self._set_motors({} if motors is None else motors)
         self._more_than_torques, self._restored = True, None
         self._held, self._engine_commands = given_torques, commands
+        self._end_motors = NO_MOTORS
         held = dict(given_torques)
         motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
         repeated = motored | frames.keys() | self._outside
@@ -505,9 +526,12 @@ class Commands:
         self._forget_steps(motored)
         self._on_frames = {}
         steps = itertools.count()
+        at_end = {k: each.end_motors for k, each in enumerate(self._loads) if each.end_motors is not None}
 
         def act(engine: Stepper) -> Forces | None:
             acting, t = constant.copy(), time + next(steps) * self._h
+            if engine.solves_motors:
+                self._end_motors = at_end
             for k in repeated:
                 loads, given = self._loads[k], held.get(k)
                 if k in of_joints:
@@ -515,14 +539,17 @@ class Commands:
                 else:
                     on_frames = [(name, force, force.share(t, self._h)) for name, force in frames.get(k, ())]
                     self._on_frames[k] = on_frames
-                    torque = loads.torque_beside_motors if k in commands else loads.torque
-                    tau = torque(*engine.robot_state(k), given, on_frames)
+                    state = engine.robot_state(k)
+                    if k in commands:
+                        tau = loads.torque_beside_motors(*state, given, on_frames)
+                    else:
+                        tau = loads.torque(*state, given, on_frames, solved=engine.solves_motors)
                 # A finite sum has finite entries; of few numbers, Python's is the fastest.
                 if not isfinite(sum(tau.tolist())) and not np.isfinite(tau).all():
                     return None
                 acting.append((k, tau))
             self._wrenches = self._sum(engine, pushes, t) if pushes else self._no_wrench
-            return Forces(acting, self._wrenches if pushes else None, commands)
+            return Forces(acting, self._wrenches if pushes else None, commands, self._end_motors)
 
         return act
 

@@ -7,7 +7,8 @@ A motor acts on the joints that it names, or on all of a robot. With h the step 
   where h kd is more than about twice the inertia that the joint feels;
 - `PositionMotor` and `VelocityMotor` evaluate the same law at the *end* of the step, which is stable at any
   gain in short steps (Tan, Liu and Turk, Stable proportional-derivative controllers, 2011). The velocity
-  there follows from the mass matrix and from the forces of the step before, those of contacts included.
+  there follows from the mass matrix and from the forces of the step before, those of contacts included. An
+  engine that `solves_motors` finds it together with all forces of the step, and is stable in long steps too.
 """
 
 from __future__ import annotations
@@ -132,7 +133,8 @@ class PositionMotor(_Servo):
     for `PDMotor`.
 
     Where the other forces (Coriolis, contacts, limits) hardly change from one step to the next the motor is
-    stable at any gain: it uses these forces of the step before. In long steps high gains diverge."""
+    stable at any gain: it uses these forces of the step before. In long steps high gains diverge. The engine
+    `dynx` solves for the end of the step instead, and has no such bound."""
 
     @checks_types
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:

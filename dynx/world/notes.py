@@ -347,7 +347,8 @@ def likely_causes(
             *_light_parts(engine),
             *unbounded_motions(layout, start),
         ]
-        gains = "" if causes else "".join(islice(_implicit_gains(layout, start, loads, h), 1))
+        predicted = not causes and not engine.solves_motors
+        gains = "".join(islice(_implicit_gains(layout, start, loads, h), 1)) if predicted else ""
     except DynxError:
         # The message of the failure itself matters more than its explanation.
         causes, gains = [], ""

@@ -117,8 +117,6 @@ def test_a_random_tree_moves_as_in_a_world(seed: int, floating: bool, gap: float
     found = {name: np.asarray(values, dtype=float) for name, values in results.items()}
     # Sweeps converge slowly where a heavy part rests on a light one.
     assume(found["residual"][0] < 0.01 * AGREEMENT)
-    # Where nothing closes, a world stops joints at their limits after the step.
-    assume(np.any(found["impulses"][: 3 * sum(touching.counts)] != 0.0))
     wanted_q, wanted_v = world_step(scene, q, v, np.zeros(model.nv))
     np.testing.assert_allclose(found["v"], wanted_v, rtol=0.0, atol=AGREEMENT)
     np.testing.assert_allclose(found["q"], wanted_q, rtol=0.0, atol=H * MAX_RESIDUAL)

@@ -194,7 +194,7 @@ class MujocoStepper(Stepper):
     @engine_errors
     def step(self, n: int, forces: Forces = NO_FORCES) -> None:
         model, data, warnings = self.model, self.data, self._warnings
-        torques, wrenches, _ = forces
+        torques, wrenches = forces.torques, forces.wrenches
         if torques or self._loaded:
             self._apply(torques)
         if wrenches is not None:

@@ -17,6 +17,10 @@ velocity that the free motion has then. Its coefficient of restitution is reduce
 velocity to that of the end of the step: a body at rest has 0, needs no threshold, and remains at rest; one
 that bounces gains no energy from the gravity of the rest of the step. The impact acts on velocities; the
 displacement of the step ends where the gap closes.
+
+**Motors** whose law holds at the end of the step add inertia and torque to their joints
+(`dynx.engines.own.end_motors`). Where the velocities at the end need more than the largest torque of a motor,
+or less at its limit, the step is solved again.
 """
 
 from __future__ import annotations
@@ -180,6 +184,14 @@ class Island:
                     gaps.append(max(float(gap[joint]), 0.0))
         return rows, np.array(gaps)
 
+    def _passes_limit(self) -> bool:
+        """Check whether the free motion carries a joint beyond a limit, or further beyond it."""
+        rows, gaps = self._limit_rows()
+        return any(
+            side * self.parts[number].free[joint] < -opening_velocity(gap, self._h)
+            for (number, joint, side), gap in zip(rows, gaps.tolist(), strict=True)
+        )
+
     def _constraint_rows(self) -> tuple[Floats, Floats, Floats]:
         """Return J (m, nv), biases (m,) [m/s or rad/s] and errors (m,) [m or rad] of welds and points: 6 and
         3 rows in axes of the world.
@@ -220,7 +232,8 @@ class Island:
     def step(self, warm: WarmStart) -> tuple[list[TouchImpulse], WarmStart]:
         """Take the step of the parts; return the impulses of the contacts, and those for the next step.
 
-        Where no contact closes or overlaps and nothing is constrained, each part completes its free motion.
+        Where no contact closes or overlaps, no joint passes a limit and nothing is constrained, each part
+        completes its free motion.
         """
         h, n = self._h, len(self.contacts)
         rows, D = self._contact_rows() if n else (np.zeros((0, 6, self._nv)), np.zeros((0, 3, 3)))
@@ -229,6 +242,7 @@ class Island:
         closes = bool((rows[:, 0] @ free < -np.maximum(gaps, 0.0) / h).any())
         # Overlaps are taken back even where nothing presses the parts together.
         closes |= bool((gaps < -NEGLIGIBLE).any())
+        closes = closes or self._passes_limit()
         if not closes and not self._constraints:
             for part in self.parts.values():
                 part.finish()
@@ -293,8 +307,11 @@ class Island:
                 more = sorted([*borne, *np.flatnonzero(short).tolist()])
                 return self._step_on(more, every, all_rows, directions_of_all, all_gaps, warm)
         last = self._impacts(sets, G, c, opening, numbers, first, normals, J)
-        self.residual = float(max(first.residuals.largest, last.residuals.largest))
         w = u if last is first else free + X @ last.impulses
+        corrected = [part.correct_motors(w[self._columns[number]]) for number, part in self.parts.items()]
+        if any(corrected):
+            return self._step_on(borne, every, all_rows, directions_of_all, all_gaps, warm)
+        self.residual = float(max(first.residuals.largest, last.residuals.largest))
         correction = self._correction(sets, G, first.velocities - opening, gaps, limit_gaps, errors, normals)
         displaced = u
         if correction is not None:

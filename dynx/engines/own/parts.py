@@ -10,6 +10,7 @@ import numpy as np
 
 from dynx.backends import backend
 from dynx.backends.solvability import Solvability
+from dynx.engines.own.end_motors import MotorsOfStep
 from dynx.model import Model
 from dynx.model.elements import Inertial, JointCoefficients, Link, Pose
 from dynx.model.mechanism import ROOT
@@ -19,6 +20,7 @@ from dynx.spatial.plain import rotation_rows
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
+from dynx.steppers.forces import EndMotors
 from dynx.steppers.joint_stops import JointStops, bounds_of_step
 from dynx.steppers.layout import BodyLayout, RobotLayout, stop_positions
 from dynx.steppers.robot_step import RobotStep
@@ -31,8 +33,10 @@ if TYPE_CHECKING:
 class OwnRobot:
     """A robot in motion: its state q (nq,), v (nv,), and what steps it.
 
-    Where nothing touches it, `step` moves it. Otherwise `begin` computes its free motion, and either `finish`
-    completes that with the bits of `step`, or `finish_at` moves it with the velocities that impulses give it.
+    In a scene without contacts and constraints `step` moves it, and its joints stop by `JointStops`.
+    Otherwise `begin` computes its free motion. Either `finish` completes that with the bits of `step`, where
+    no joint passes a limit, or `finish_at` moves it with the velocities that impulses give it, those of
+    limits among them.
     Velocities of `free`, `jacobian`, `response` and `finish_at` are coordinates in the axes at the beginning
     of the step.
     """
@@ -57,25 +61,38 @@ class OwnRobot:
         self._stops = JointStops(model, lambda q: mass_matrix(q) + armature) if limited else None
         self.q, self.v = model.neutral(), np.zeros(model.nv)
         self._no_torque = np.zeros(model.nv)
+        self._motors: MotorsOfStep | None = None
+        self.motor_torque = self._no_torque
+        """Torque (nv,) of motors at the end of the last step."""
         self._h = h
         self.nv = model.nv
         self._floating = model.floating
         mechanism = model.mechanism
         self._frames = [mechanism.frames[k].name for k in mechanism.body_frames]
         self._frame_numbers = list(mechanism.body_frames)
+        self._base = 6 if model.floating else 0
+        self._places: slice | list[int] = slice(7 if model.floating else 0, None)
+        """Indices in q of the coordinates of joints, which motors read; those of ball joints have none."""
+        if model.ball_joints:
+            self._places = list(mechanism.places[self._base :])
         self.dry: Floats = joints.friction
         """Torque (nv,) of dry friction [N m or N]."""
         self.dry_joints = np.flatnonzero(joints.friction)
-        self.limits: tuple[Floats, Floats] | None = stop_positions(model) if limited else None
-        """Lowest and highest positions (n,) of the joints [rad or m], which are the last n coordinates; None
-        without limits."""
+        has_rows = limited and not model.ball_joints
+        self.limits: tuple[Floats, Floats] | None = stop_positions(model) if has_rows else None
+        """Lowest and highest positions (n,) of the joints [rad or m], which are the last n coordinates, at
+        which impulses stop them. None without limits, and with ball joints, where `JointStops` stop all."""
         self.free: Floats = self._no_torque
         """Velocity (nv,) at the end of the step without impulses."""
 
-    def step(self, tau: Floats | None) -> None:
-        """Take one step under a generalised force (nv,)."""
+    def step(self, tau: Floats | None, motors: EndMotors | None = None) -> None:
+        """Take one step under a generalised force (nv,) and motors at its end."""
         before = self.q
-        self.q, self.v, _ = self._step(before, self.v, self._no_torque if tau is None else tau)
+        if motors is None:
+            self.q, self.v, _ = self._step(before, self.v, self._no_torque if tau is None else tau)
+        else:
+            self.begin(tau, motors)
+            self._move_freely()
         self._stop(before)
 
     def _stop(self, before: Floats) -> None:
@@ -85,17 +102,46 @@ class OwnRobot:
 
     # -- a step with impulses -----------------------------------------------------------------
 
-    def begin(self, tau: Floats | None) -> None:
-        """Compute the free motion of a step under a generalised force (nv,)."""
-        self._tau = self._no_torque if tau is None else tau
-        self._motion = self._step.motion(self.q, self.v, self._tau)
-        a, moves = self._motion
-        self.free = self._end_velocity(a)
-        if moves is not None:
-            self.free = moves * self.free
+    def begin(self, tau: Floats | None, motors: EndMotors | None = None) -> None:
+        """Compute the free motion of a step under a generalised force (nv,) and motors at its end."""
+        self._given = self._no_torque if tau is None else tau
+        self._motors = None
+        if motors is not None:
+            self._motors = MotorsOfStep(motors, self._h, self.q[self._places], self.v[self._base :])
+        while True:
+            self._apply_motors()
+            self._motion = self._step.motion(self.q, self.v, self._tau, added=self._added)
+            a, moves = self._motion
+            self.free = self._end_velocity(a)
+            if moves is not None:
+                self.free = moves * self.free
+            if self._motors is None or not self._motors.correct(self.free[self._base :]):
+                break
+        self.forget_placements()
+
+    def _apply_motors(self) -> None:
+        """Take torque and inertia of the motors as they are found so far."""
+        self._tau, self._added = self._given, None
+        if self._motors is not None:
+            self._added = np.concatenate([np.zeros(self._base), self._motors.inertia])
+            self._tau = self._given.copy()
+            self._tau[self._base :] += self._motors.torque
         self._inertia: Floats | None = None
         self.__dict__.pop("_inverse", None)
-        self.forget_placements()
+
+    def correct_motors(self, end: Floats) -> bool:
+        """Correct which motors are at their limits, if the step ends at the velocity `end` (nv,); return
+        whether the free motion is another one."""
+        if self._motors is None or not self._motors.correct(end[self._base :]):
+            return False
+        self._apply_motors()
+        a, self._inertia = self._step.without_dry_friction(self.q, self.v, self._tau, self._added_inertia)
+        self.free = self._end_velocity(a)
+        return True
+
+    @property
+    def _added_inertia(self) -> Floats | float:
+        return 0.0 if self._added is None else self._added
 
     def forget_placements(self) -> None:
         """Forget the poses of the last state."""
@@ -116,7 +162,8 @@ class OwnRobot:
     def release_dry_friction(self) -> None:
         """Take dry friction out of the free motion, because it is among the impulses."""
         if self.dry_joints.size:
-            a, self._inertia = self._step.without_dry_friction(self.q, self.v, self._tau)
+            a, self._inertia = self._step.without_dry_friction(self.q, self.v, self._tau, self._added_inertia)
+            self.__dict__.pop("_inverse", None)
             self.free = self._end_velocity(a)
 
     @cached_property
@@ -174,7 +221,9 @@ class OwnRobot:
 
     @cached_property
     def _inverse(self) -> Floats:
-        A = self._step.inertia(self.q) if self._inertia is None else self._inertia
+        A = self._inertia
+        if A is None:
+            A = self._step.inertia(self.q, self._added_inertia)
         inverse: Floats = np.asarray(np.linalg.inv(A))
         symmetric: Floats = 0.5 * (inverse + inverse.T)
         return symmetric
@@ -182,16 +231,32 @@ class OwnRobot:
     def finish(self) -> None:
         """Complete the free motion."""
         before = self.q
-        self.q, self.v, _ = self._scheme.moved(before, self.v, *self._motion)
-        self._stop(before)
+        self._move_freely()
+        if self.limits is None:
+            self._stop(before)
+        self._keep_within(before)
+
+    def _move_freely(self) -> None:
+        self._keep_motor_torque(self.free)
+        self.q, self.v, _ = self._scheme.moved(self.q, self.v, *self._motion)
+
+    def _keep_motor_torque(self, end: Floats) -> None:
+        if self._motors is not None:
+            torque = self._motors.torque_at(end[self._base :])
+            self.motor_torque = np.concatenate([np.zeros(self._base), torque])
 
     def finish_at(self, u: Floats, w: Floats) -> None:
         """Move with the velocity u (nv,), and end at the velocity w (nv,)."""
         before = self.q
+        self._keep_motor_torque(w)
         if self._floating:
             self.q, self.v = self._displaced(u, w)
         else:
             self.q, self.v = moved_joints(before, self._h * u, self._scheme.balls), w
+        self._keep_within(before)
+
+    def _keep_within(self, before: Floats) -> None:
+        """Take back what rounding carries joints beyond limits that are rows."""
         if self.limits is not None:
             first = len(self.q) - len(self.limits[0])
             low, high = bounds_of_step(before[first:], *self.limits)

@@ -1,16 +1,17 @@
 """`OwnStepper`: robots and bodies of a scene moved by dynx itself, over any backend.
 
 Each robot has a backend of its own, which computes its dynamics, and a body is a floating robot of one link.
-What nothing touches takes the step of `dynx.simulate`: `dynx.steppers.robot_step` and the stops of
-`dynx.steppers.joint_stops`. Contacts and constraints connect parts to islands
-(`dynx.engines.own.impulses`), whose impulses `dynx.rbd.constraints` solves.
+What nothing touches takes the step of `dynx.simulate` (`dynx.steppers.robot_step`). Contacts and constraints
+connect parts to islands (`dynx.engines.own.impulses`), whose impulses `dynx.rbd.constraints` solves, and with
+them those of joint limits. Only where a scene has neither contacts nor constraints, joints stop as in
+`dynx.simulate` (`dynx.steppers.joint_stops`), under any integrator.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Mapping, Sequence
-from math import hypot, isfinite
+from math import hypot
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,6 +22,7 @@ from dynx.engines.own.impulses import Island, TouchImpulse, WarmStart
 from dynx.engines.own.parts import OwnBody, OwnRobot, robot_of
 from dynx.engines.own.touching import ContactFinder, PossibleContact
 from dynx.errors import UnsupportedFeatureError, shown
+from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.steppers.failures import translate_failures
@@ -79,6 +81,7 @@ class OwnStepper(Stepper):
         super().__init__(layout, dt, settings)
         self.closed = False
         self._version = f"dynx {__version__}"
+        self._solves_motors = bool(settings["integrator"] == "semi_implicit")
         self._robots: list[OwnRobot] = []
         self._bodies: dict[int, OwnBody] = {}
         try:
@@ -134,20 +137,28 @@ class OwnStepper(Stepper):
         torques = dict(forces.torques)
         for _ in range(n):
             if self._has_islands:
-                self._step_islands(torques, forces.wrenches)
+                self._step_islands(torques, forces)
                 continue
             for k, robot in enumerate(self._robots):
-                robot.step(torques.get(k))
+                robot.step(torques.get(k), forces.motors.get(k))
             for k, body in self._bodies.items():
                 body.step(None if forces.wrenches is None else body.push(forces.wrenches[k]))
 
-    def _step_islands(self, torques: Mapping[int, Floats], wrenches: Floats | None) -> None:
+    @property
+    def solves_motors(self) -> bool:
+        return self._solves_motors
+
+    def motor_torque(self, robot: int) -> Floats | None:
+        return self._robots[robot].motor_torque
+
+    def _step_islands(self, torques: Mapping[int, Floats], forces: Forces) -> None:
+        wrenches = forces.wrenches
         for k, robot in enumerate(self._robots):
-            robot.begin(torques.get(k))
+            robot.begin(torques.get(k), forces.motors.get(k))
         for k, body in self._bodies.items():
             body.begin(None if wrenches is None else body.push(wrenches[k]))
-        if not all(isfinite(sum(part.free.tolist())) for part in self._moving):
-            # The world notices that the motion has diverged.
+        if not all(hypot(*part.free.tolist()) <= DIVERGENCE_SPEED for part in self._moving):
+            # The world notices that the motion has diverged. A part that fast would touch all others.
             for part in self._moving:
                 part.finish()
             return
@@ -194,7 +205,8 @@ class OwnStepper(Stepper):
         poses: Mapping[Owner, Floats],
         jacobians: Mapping[Owner, Floats],
     ) -> Iterable[Island]:
-        """Return the islands of parts that contacts and constraints connect, in the order of their parts."""
+        """Return the islands of parts that contacts and constraints connect, and of robots with joint limits,
+        in the order of their parts."""
         leader = list(range(len(self._moving)))
 
         def find(k: int) -> int:
@@ -216,7 +228,10 @@ class OwnStepper(Stepper):
         members: dict[int, list[int]] = {}
         for k in range(len(leader)):
             members.setdefault(find(k), []).append(k)
-        held: dict[int, list[int | PossibleContact]] = {}
+        # A robot that nothing touches has its joint limits.
+        held: dict[int, list[int | PossibleContact]] = {
+            find(k): [] for k, part in enumerate(self._moving) if part.limits is not None
+        }
         for k, link in links:
             held.setdefault(find(k), []).append(link)
         for first in sorted(held):

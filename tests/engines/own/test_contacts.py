@@ -183,7 +183,8 @@ def test_a_ball_that_bounces_gains_no_energy_and_comes_to_rest() -> None:
 def test_bodies_in_the_air_move_with_the_bits_of_a_world_without_contacts() -> None:
     high = dynx.Pose((0, 0, 5.0), (0.1, 0.2, 0.3))
     brick = box("brick", (0.1, 0.2, 0.3), mass=1.0, pose=high, twist=(1, 0, 0, 3, 2, 1))
-    pendulum = SceneRobot("arm", dynx.load("panda"))
+    # Within its limits: only with contacts or constraints they are rows of impulses.
+    pendulum = SceneRobot("arm", dynx.load("panda"), q=(0.0, 0.3, 0.0, -1.5, 0.0, 1.5, 0.0, 0.02))
     scene = Scene("air", bodies=(ground(pose=dynx.Pose((0, 0, -2))), brick), robots=(pendulum,))
     states = []
     for collisions in (True, False):
@@ -283,6 +284,27 @@ def test_a_joint_in_contact_stops_at_its_limit_and_sticks_by_dry_friction() -> N
         assert v[0] == pytest.approx(0.0, abs=1e-12)
         assert q[0] == pytest.approx(0.0 if held else 0.05, abs=1e-12)
         assert x == pytest.approx(q[0] - 0.2, abs=1e-9)
+
+
+def test_a_joint_stops_at_its_limit_by_the_law_of_contacts_where_nothing_touches() -> None:
+    """It reaches the limit at the end of a step, and has no velocity after the next one."""
+    text = """<robot name="slider"><link name="base"/><link name="block">
+      <inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+      <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+      <joint name="slide" type="prismatic"><parent link="base"/><child link="block"/><axis xyz="1 0 0"/>
+      <limit lower="-0.1" upper="0.05" effort="1" velocity="1"/></joint></robot>"""
+    h, start = 1e-3, 0.05 - 2.5e-3
+    robot = SceneRobot("slider", dynx.load(text), q=(start,), v=(1.0,))
+    far = sphere("ball", 0.1, mass=1.0, pose=dynx.Pose((5.0, 0, 0)))
+    for bodies in ((far,), (ground(pose=dynx.Pose((0, 0, -1))), far)):
+        scene = Scene("stop", robots=(robot,), bodies=bodies, gravity=(0.0, 0.0, 0.0))
+        found = []
+        with World(scene, "dynx", h) as world:
+            for _ in range(4):
+                world.step()
+                found.append((*world.state.robots["slider"].q, *world.state.robots["slider"].v))
+        wanted = [(start + h, 1.0), (start + 2.0 * h, 1.0), (0.05, 0.5), (0.05, 0.0)]
+        assert np.array(found) == pytest.approx(np.array(wanted), abs=1e-9)
 
 
 def test_impulses_that_miss_their_conditions_are_noted(monkeypatch: pytest.MonkeyPatch) -> None:
