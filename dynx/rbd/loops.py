@@ -284,7 +284,10 @@ class PythonLoops(Loops):
 
 
 class _Matrices:
-    """Matrices as lists of rows, each a list of entries (...,), or of blocks (..., width) of columns."""
+    """Matrices by their entries (...,), or their blocks (..., width) of columns; all others are zero.
+
+    A robot of many separate branches has a mass matrix of which few entries are not zero.
+    """
 
     def __init__(
         self, n: int, shape: tuple[int, int], zero: Array, batch: tuple[int, ...], width: int
@@ -292,12 +295,12 @@ class _Matrices:
         self._zero = zero if width == 1 else append_axis(zero) * np.zeros(width, dtype=int)
         self._shape = (*batch, shape[0], shape[1] * width)
         self._width = width
-        self._tables = [[[self._zero] * shape[1] for _ in range(shape[0])] for _ in range(n)]
+        self._tables: list[dict[tuple[int, int], Array]] = [{} for _ in range(n)]
 
     def put(self, row: int, column: int, entries: Sequence[Array]) -> None:
         """Enter one entry or block in each matrix."""
         for table, entry in zip(self._tables, entries, strict=True):
-            table[row][column] = entry + self._zero
+            table[row, column] = entry + self._zero
 
     def assembled(self) -> tuple[Array, ...]:
         """Return the matrices as arrays."""
@@ -305,13 +308,20 @@ class _Matrices:
             return tuple(np.zeros(self._shape) for _ in self._tables)
         return tuple(self._assembled(table) for table in self._tables)
 
-    def _assembled(self, table: list[list[Array]]) -> Array:
-        shapes = {getattr(entry, "shape", ()) for row in table for entry in row}
-        if len(shapes) > 1:
-            shape = np.broadcast_shapes(*shapes)
-            table = [[np.broadcast_to(entry, shape) for entry in row] for row in table]
-        join = np.stack if self._width == 1 else np.concatenate
-        return np.stack([join(row, axis=-1) for row in table], axis=-2)
+    def _assembled(self, table: dict[tuple[int, int], Array]) -> Array:
+        entries = [self._zero, *table.values()]
+        shape = np.broadcast_shapes(*{getattr(entry, "shape", ()) for entry in entries})
+        batch = shape if self._width == 1 else shape[:-1]
+        kinds = {getattr(entry, "dtype", np.dtype(object)) for entry in entries}
+        found = np.empty((*batch, *self._shape[-2:]), dtype=np.result_type(*kinds))
+        blocks = found.reshape(*batch, self._shape[-2], self._shape[-1] // self._width, self._width)
+        # Of width 1, entries have no axis of their own.
+        inside = 0 if self._width == 1 else slice(None)
+        zero = append_axis(self._zero) if self._width == 1 else self._zero
+        blocks[...] = zero[..., None, None, :]
+        for (row, column), entry in table.items():
+            blocks[..., row, column, inside] = entry
+        return found
 
 
 def moving_frames(mechanism: Mechanism, frames: Sequence[int]) -> Iterator[tuple[int, BodyFrame]]:

@@ -39,12 +39,13 @@ from dynx.same.elements import (
     are_equal,
 )
 from dynx.same.fit import Fit
-from dynx.same.mending import NotMendedError, mended_text, with_stated_parts
+from dynx.same.mending import mended_text, with_stated_parts
 from dynx.same.report import Coordinate, ElementDifference, SameReport, Unmatched
 from dynx.same.sensors import sensor_differences
 from dynx.same.skeleton import Skeleton, exact_skeleton, without_standing_mimics
 from dynx.same.stated_parts import StatedChange, StatedParts, changed_model, effects_of
 from dynx.same.text import inertial_text, pose_text, vector_text
+from dynx.same.text_edits import NotMendedError
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 
@@ -456,7 +457,7 @@ def _with_stated_parts(
     while changes:
         try:
             # The lines are those of the file: its elements are replaced last.
-            source = with_stated_parts(second.source, model, changes)
+            source = with_stated_parts(second.source, second.model, model, changes)
             if mended is not None:
                 source = mended_text(source, second.model, mended)
             again = read_model(source.to_bytes(), second.model.source, None, base=None)

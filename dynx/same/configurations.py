@@ -60,16 +60,35 @@ def configuration_differences(
         yield Attribute(kind, "configuration", labels[0], labels[1], texts[0], texts[1], lines[0], lines[1])
 
 
+class ConfigurationPair(NamedTuple):
+    """Configurations that correspond, by their names or because they are equal; None for one alone.
+
+    `joints` are our names of the joints whose positions differ, and `base` tells whether the bases do.
+    """
+
+    mine: NamedConfiguration | None
+    other: NamedConfiguration | None
+    equal: bool
+    joints: frozenset[str] = frozenset()
+    base: bool = False
+
+
 def configuration_pairs(
     ours: Model, theirs: Model, found: Fit, tolerance: float
-) -> Iterator[tuple[NamedConfiguration | None, NamedConfiguration | None, bool]]:
-    """Yield the configurations that correspond, by their names or because they are equal, each pair with
-    whether they are; None for one alone."""
+) -> Iterator[ConfigurationPair]:
+    """Yield the configurations of two robots, in pairs."""
     mine, other = (
         {each.name: each for each in model.stated_configurations or ()} for model in (ours, theirs)
     )
-    for one, two, equal in _CommonCoordinates(ours, theirs, found, tolerance).pairs():
-        yield None if one is None else mine[one.name], None if two is None else other[two.name], equal
+    rules = _CommonCoordinates(ours, theirs, found, tolerance)
+    for one, two, equal in rules.pairs():
+        if one is None or two is None:
+            yield ConfigurationPair(
+                None if one is None else mine[one.name], None if two is None else other[two.name], equal
+            )
+            continue
+        joints = frozenset(rules.changed(one, two))
+        yield ConfigurationPair(mine[one.name], other[two.name], equal, joints, rules.base_differs(one, two))
 
 
 def joints_of_other_kinds(ours: Model, theirs: Model, found: Fit) -> dict[str, str | None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import inverse
 
 UNBOUNDED = (-INFINITY, INFINITY)
+
+ROUNDING = 1e-14
+"""Difference of two coefficients of a polynomial, relative to the largest coefficient, that is rounding."""
 
 
 # -- tendons ----------------------------------------------------------------------------------------------
@@ -103,7 +107,7 @@ def equality_differences(
     A constraint of frames is equal to one of links that holds the same. One that couples the same parts in
     the other order is a freedom.
     """
-    rules = _Constraints(ours, theirs, found, tolerance)
+    rules = Constraints(ours, theirs, found, tolerance)
     pairs = list(equality_pairs(ours, theirs, found, tolerance))
     yield from part_differences(iter(pairs), "equality", "equality", equality_text, lambda each: each.type)
     for mine, other, equal in pairs:
@@ -120,7 +124,7 @@ def equality_pairs(
     they are; None for one alone. Nothing where a description leaves them open."""
     if ours.equalities is None or theirs.equalities is None:
         return iter(())
-    rules = _Constraints(ours, theirs, found, tolerance)
+    rules = Constraints(ours, theirs, found, tolerance)
     return counterparts(ours.equalities, theirs.equalities, rules.are_equal, lambda each: each.type)
 
 
@@ -150,7 +154,7 @@ def coupled_as(equality: StatedEquality) -> tuple[str, str, float, float] | None
     return equality.first, equality.second, multiplier, offset
 
 
-class _Constraints:
+class Constraints:
     """Parts and numbers of the constraints of two robots, in names and axes of the first robot."""
 
     def __init__(self, ours: Model, theirs: Model, found: Fit, tolerance: float) -> None:
@@ -164,17 +168,25 @@ class _Constraints:
         }
 
     def are_equal(self, mine: StatedEquality, other: StatedEquality) -> bool:
-        """Check whether two constraints hold the same."""
-        settings = (mine.type, mine.active), (other.type, other.active)
-        if settings[0] != settings[1] or differs(mine.torque_scale, other.torque_scale, self._tolerance):
-            return False
+        """Check whether two constraints hold the same with the same settings."""
+        return self.with_settings(mine, other) == other and self.hold_the_same(mine, other)
+
+    def with_settings(self, mine: StatedEquality, other: StatedEquality) -> StatedEquality:
+        """Return `other` with those settings of `mine` that differ."""
+        new = replace(other, active=mine.active)
+        if differs(mine.torque_scale, other.torque_scale, self._tolerance):
+            new = replace(new, torque_scale=mine.torque_scale)
         for name in ("solref", "solimp"):
             numbers = getattr(mine, name), getattr(other, name)
-            if len(numbers[0]) != len(numbers[1]):
-                return False
-            if any(differs(a, b, self._tolerance) for a, b in zip(*numbers, strict=True)):
-                return False
-        return self.are_in_order(mine, other) or self._are_swapped(mine, other)
+            if len(numbers[0]) != len(numbers[1]) or any(
+                differs(a, b, self._tolerance) for a, b in zip(*numbers, strict=True)
+            ):
+                new = replace(new, **{name: numbers[0]})
+        return new
+
+    def hold_the_same(self, mine: StatedEquality, other: StatedEquality) -> bool:
+        """Check whether two constraints are of one type and couple the same parts, in any order."""
+        return mine.type == other.type and (self.are_in_order(mine, other) or self._are_swapped(mine, other))
 
     def are_in_order(self, mine: StatedEquality, other: StatedEquality) -> bool:
         """Check whether two constraints of one type hold the same, first and second part as they are."""
@@ -203,7 +215,11 @@ class _Constraints:
         return tuple(name for name, _ in joints), signs[0] * numbers * signs[1] ** np.arange(5.0)
 
     def _same_numbers(self, mine: Floats, other: Floats) -> bool:
-        return not any(differs(a, b, self._tolerance) for a, b in zip(mine, other, strict=True))
+        # A polynomial that is written for other reference positions has rounding in each coefficient.
+        rounding = ROUNDING * float(max(np.max(np.abs(mine)), np.max(np.abs(other))))
+        return not any(
+            abs(a - b) > rounding and differs(a, b, self._tolerance) for a, b in zip(mine, other, strict=True)
+        )
 
     def _ends(self, other: StatedEquality) -> list[PlaceInBody | None]:
         """Return the places of what coincides, in our bodies."""

@@ -256,16 +256,26 @@ def _by_tendon(actuators: tuple[Actuator, ...]) -> dict[str, list[Actuator]]:
 
 
 def _are_equal(one: Actuator, other: Actuator, sign: int, tolerance: float) -> bool:
-    """Check whether two actuators are equal if commands, positions and efforts of the second one are those of
-    the first times `sign`."""
+    """Check whether two actuators are equal if positions and efforts of the second one are those of the first
+    times `sign`, and commands either are too or stay the same."""
+    return any(_are_equal_with(one, other, sign, command, tolerance) for command in {sign, 1})
+
+
+def _are_equal_with(one: Actuator, other: Actuator, sign: int, command: int, tolerance: float) -> bool:
+    """Check whether two actuators are equal if positions and efforts of the second one are those of the first
+    times `sign`, and commands and forces times `command`.
+
+    With a reversed force, the gear has the sign that reverses the effort again, and ``gear q`` is what the
+    force adds to it.
+    """
     pairs = [
-        (one.gear, other.gear),
+        (one.gear, sign * command * other.gear),
         (one.gain, other.gain),
-        (one.bias[0], sign * other.bias[0]),
+        (one.bias[0], command * other.bias[0]),
         *zip(one.bias[1:], other.bias[1:], strict=True),
     ]
     for mine, theirs in ((one.control_range, other.control_range), (one.force_range, other.force_range)):
-        pairs += zip(mine, sorted(sign * end for end in theirs), strict=True)
+        pairs += zip(mine, sorted(command * end for end in theirs), strict=True)
     return not any(differs(first, second, tolerance) for first, second in pairs)
 
 

@@ -19,7 +19,7 @@ from dynx.model.mechanism import ROOT, pose_arrays
 from dynx.model.topology import resolve_mimics
 from dynx.same.decimals import decimals, fifty_digits, rounded
 from dynx.same.fit import BodyFit, Fit, angle_of, drive, fit
-from dynx.same.matching import UNCHANGED, BodyPair, Matching, MatchingPlan
+from dynx.same.matching import UNCHANGED, BodyPair, Matching, MatchingPlan, is_of_reader
 from dynx.same.observability import observability_of
 from dynx.same.registration import principal_frames
 from dynx.same.scales import inertia_ratio
@@ -254,6 +254,22 @@ def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[
                 if other is not None:
                     yield other
 
+    written_otherwise = [
+        joint
+        for joint in model.joints
+        if not (joint.moves or joint.name in tried)
+        and not (joint.name in mine and are_alike(mine[joint.name].origin, joint.origin))
+    ]
+    # Where the joint of a body is written as in the other description, a fixed joint in the body is at fault.
+    unlikely = {found.theirs.number[each.theirs] for each in analysis.elements if _is_unlikely(model, each)}
+    for joint in written_otherwise:
+        body = found.theirs.body_of[joint.child]
+        if body in unlikely:
+            with fifty_digits():
+                displacement = _from_followed(found, body)
+            other = _placed(found, mine.get(joint.name), joint, displacement)
+            if other is not None:
+                yield other
     for joint in [joint for joint in model.joints if joint.name in below and joint.name not in tried]:
         # What is written as in the other description is not at fault; what has no counterpart there may be
         # if several elements, or the place of a joint, depend on it.
@@ -268,14 +284,25 @@ def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[
             yield from placed(joint, elements, beside=False)
     # The frame of a body may be chosen for what is below a fixed joint: all else in the body differs then, as
     # may its own joint, or a floating base.
-    if sum(each.theirs not in tried for each in analysis.elements) < 2:
-        return
-    for joint in model.joints:
-        if joint.moves or joint.name in below or joint.name in tried:
-            continue
+    several = sum(each.theirs not in tried for each in analysis.elements) > 1
+    for joint in written_otherwise if several else []:
         elements = in_body.get(found.theirs.body_of[joint.child], [])
-        if elements and not (joint.name in mine and are_alike(mine[joint.name].origin, joint.origin)):
+        if elements and joint.name not in below:
             yield from placed(joint, elements, beside=True)
+
+
+def _is_unlikely(model: Model, element: DifferingElement) -> bool:
+    """Check whether an element is the place of a joint that moves and is written as in the other robot."""
+    is_place = element.tag == "joint" and element.part == "origin"
+    return is_place and element.unchanged and model.joint(element.theirs).moves
+
+
+def _from_followed(found: Fit, body: int) -> Array:
+    """Return the pose (4, 4) of the frame of a body in the frame that it has if its own joint is right."""
+    fits = {each.theirs: each for each in found.bodies}
+    each, parent = fits[body], fits[found.theirs.bodies[body].parent]
+    followed = inverse(found.ours.exact[each.ours]) @ parent.D @ found.theirs.exact[body]
+    return inverse(followed) @ each.D
 
 
 def _displacements(found: Fit, joint: Joint, element: DifferingElement) -> Iterator[Array]:
@@ -381,12 +408,31 @@ def _other_types(ours: Model, theirs: Model) -> Iterator[DifferingElement]:
 
 def _named_counterparts(ours: Model, theirs: Model) -> dict[str, Joint]:
     """Return the joint of `ours` of the same name, or else with a child link of the same name, by the name of
-    the joint of `theirs`: a fixed joint of MJCF has no name, and its link has."""
+    the joint of `theirs`: a fixed joint of MJCF has no name, and its link has.
+
+    A fixed joint that a reader adds below another joint of the same body has the counterpart of its name at
+    most, since the other joint holds the body too.
+    """
     mine = {joint.name: joint for joint in ours.joints}
     names = {joint.name for joint in theirs.joints}
-    children = {joint.child: joint for joint in ours.joints if joint.name not in names}
-    pairs = ((joint.name, mine.get(joint.name, children.get(joint.child))) for joint in theirs.joints)
+    added, their_added = (set(_added_joints(model)) for model in (ours, theirs))
+    children = {joint.child: joint for joint in ours.joints if joint.name not in names | added}
+    pairs = (
+        (
+            joint.name,
+            mine.get(joint.name) or (None if joint.name in their_added else children.get(joint.child)),
+        )
+        for joint in theirs.joints
+    )
     return {name: joint for name, joint in pairs if joint is not None}
+
+
+def _added_joints(model: Model) -> Iterator[str]:
+    """Yield the fixed joints that a reader adds between a joint and its body, which lies beside the joint."""
+    above = {joint.child: joint for joint in model.joints}
+    for joint in model.joints:
+        if not joint.moves and joint.parent in above and is_of_reader(model, above[joint.parent]):
+            yield joint.name
 
 
 def _of_joints(found: Fit, tolerance: float) -> Iterator[DifferingElement]:
@@ -396,10 +442,10 @@ def _of_joints(found: Fit, tolerance: float) -> Iterator[DifferingElement]:
         if each.ours == ROOT:
             continue
         parent = frames[found.theirs.bodies[each.theirs].parent]
-        if max(each.turn, each.shift / length) > tolerance:
-            yield _origin(found, each, parent)
         if each.line / length > tolerance:
-            yield _moved_axis(found, each)
+            yield _moved_axis(found, each, parent)
+        elif max(each.turn, each.shift / length) > tolerance:
+            yield _origin(found, each, parent)
         if each.axis > tolerance:
             yield _axis(found, each)
         if each.scale > tolerance * _unit_scale(found, each) or each.offset > tolerance * (
@@ -453,18 +499,23 @@ def _about(off: Array, axis: Floats) -> bool:
     return float(np.linalg.norm(R @ axis - axis)) < 1e-12 * max(1.0, float(np.linalg.norm(R - np.eye(3))))
 
 
-def _moved_axis(found: Fit, each: BodyFit) -> DifferingElement:
-    """Make the element of a joint whose axis is moved parallel, while its link is where it should be."""
+def _moved_axis(found: Fit, each: BodyFit, parent: BodyFit) -> DifferingElement:
+    """Make the element of a joint whose axis is moved parallel, while its link is where it should be, or
+    where a place beside it has it."""
     mine, joint = _joints(found, each)
+    origin = joint.origin.matrix
+    if max(each.turn, each.shift / found.ours.reach) > SNAP:
+        wanted = inverse(parent.D) @ found.ours.exact[each.ours] @ each.D
+        origin = rounded(inverse(found.theirs.parent_pose(each.theirs)) @ wanted)
     D, axis = rounded(each.D), found.ours.axes[each.ours]
     is_ball = found.ours.kinds[each.ours] == "ball"
     foot = np.zeros(3) if is_ball else axis * float(axis @ D[:3, 3])
     shift = D[:3, :3].T @ (foot - D[:3, 3])
     there, back = homogeneous(np.eye(3), shift), homogeneous(np.eye(3), -shift)
-    origin = nearest_pose(decimals(joint.origin.matrix @ there), mine.origin)
-    changes = [FieldChange("joint", joint.name, "origin", origin)]
+    pose = nearest_pose(decimals(origin @ there), mine.origin)
+    changes = [FieldChange("joint", joint.name, "origin", pose)]
     link = found.theirs.model.link(joint.child)
-    if link.inertial is not None:
+    if link.inertial is not None and (link.inertial.mass or link.inertial.tensor.any()):
         moved = replace(link.inertial, origin=Pose.from_matrix(back @ link.inertial.origin.matrix))
         changes.append(FieldChange("link", link.name, "inertial", moved))
     changes += [

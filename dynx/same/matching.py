@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from dynx.model import Model
+from dynx.model.elements import Joint
 from dynx.model.mechanism import ROOT
 from dynx.same.limits import limit_differences
 from dynx.same.registration import candidates, candidates_of_other_pairings
@@ -37,6 +39,9 @@ FRAMES_PER_JOINT = 12
 
 MAX_CANDIDATES = 100
 """Largest number of candidates for the frame of one body."""
+
+MAX_TURNED = 40
+"""Number of candidates among which a frame is looked for that is slightly turned."""
 
 MAX_BASES = 3
 """Largest number of frames of a floating base below which all others are tried."""
@@ -114,6 +119,7 @@ class Matching:
     _turned_counts: dict[tuple[int, int], float] = field(default_factory=dict)
     _own_costs: dict[Key, float] = field(default_factory=dict)
     _unmoved: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _turned_fits: dict[tuple[int, int], bool] = field(default_factory=dict)
     _exhausted: set[tuple[int, int]] = field(default_factory=set)
     _candidates: dict[tuple[int, int], list[Floats]] = field(default_factory=dict)
 
@@ -140,6 +146,7 @@ class Matching:
         found: list[tuple[float, int, Floats]] = []
         # A root without mass looks the same in any frame.
         unmoved = float(self.ours.inertias[ROOT].mass) > 0.0 and self._is_unmoved(ROOT, ROOT)
+        unmoved = unmoved and not self._fits_turned(ROOT, ROOT)
         bases = [np.eye(4)] if unmoved else self._candidates_of(ROOT, ROOT)
         for number, D in enumerate(bases):
             limit = found[MAX_BASES - 1][0] if len(found) >= MAX_BASES else np.inf
@@ -295,19 +302,26 @@ class Matching:
         if self.ours.kinds[a] == "ball":
             return self._turned(a, b, followed)
         unmoved = self._is_unmoved(a, b)
-        if unmoved and not _is_identity(followed) and self._axis_cost(a, b, followed) > 0.0:
-            return self._chosen(a, b, np.eye(4), _cost(self._has_equal_origins(a, b)))
-        best = self._subtree(a, b, followed)
-        # Another frame is one element at least.
-        if best.rank <= (1.0, 0):
-            return best
+        # A joint of MJCF that is moved in its body is one element; the body is where it should be.
+        elsewhere = self._axis_cost(a, b, followed) > 0.0 and self._own_cost(a, b, followed) > UNCHANGED
+        as_they_are = unmoved and not _is_identity(followed) and elsewhere
+        if not as_they_are:
+            best = self._subtree(a, b, followed)
+            # Another frame is one element at least.
+            if best.rank <= (1.0, 0):
+                return best
         if unmoved:
             plan = self._chosen(a, b, np.eye(4), _cost(self._has_equal_origins(a, b)))
-            return plan if plan.rank < best.rank else best
-        replaced = _cost(self._has_equal_origins(a, b))
-        for D, cost in self._ordered_frames(a, b, followed, best.rank[0] - replaced):
+            if as_they_are or plan.rank < best.rank:
+                best = plan
+            if best.rank <= (UNCHANGED, 0) or not self._fits_turned(a, b):
+                return best
+        for D, cost in self._ordered_frames(a, b, followed, best.rank[0]):
             if len(self._plans) > MAX_PLANS:
                 break
+            if unmoved and not self._is_near(D):
+                continue
+            replaced = self._place_cost(a, b, D)
             if (round(replaced + cost, 6), 0) >= best.rank:
                 continue
             if (round(replaced + self._bound(a, b, D), 6), 0) >= best.rank:
@@ -323,7 +337,7 @@ class Matching:
         self, a: int, b: int, followed: Floats, limit: float
     ) -> Iterator[tuple[Floats, float]]:
         """Yield the frames that body b may have in body a, but `followed`, with the number of elements that
-        differ of the bodies themselves, which is at most `limit`.
+        differ of the bodies themselves; with the place of the joint it is below `limit`.
 
         Those are first below which the fewest elements differ if all frames follow. Those with `SLACK` more
         than the first are left out, unless the bodies themselves fit: below a right frame a misplaced joint
@@ -335,7 +349,9 @@ class Matching:
         for D in chain([np.eye(4)], self._aligned(a, b, followed), self._candidates_of(a, b)):
             # A frame in which the body itself fits worse than before is not that of the body.
             cost = self._own_cost(a, b, D)
-            if cost > own or cost >= limit or float(np.max(np.abs(D - followed))) <= SAME_FRAME:
+            if cost > own or self._place_cost(a, b, D) + cost >= limit:
+                continue
+            if float(np.max(np.abs(D - followed))) <= SAME_FRAME:
                 continue
             count = self._followed(a, b, D, fewest + SLACK)
             if count == 0.0:
@@ -537,12 +553,21 @@ class Matching:
         cost = 0.0
         if float(np.linalg.norm(cross(axis, mine))) > self.tolerance:
             cost = _cost(self.ours.joints[a].axis == self.theirs.joints[b].axis)
-        if self.ours.kinds[a] == "revolute":
-            off = float(np.linalg.norm(cross(D[:3, 3], mine)))
-            if off > self.tolerance * self.length:
-                # The joint must be moved and what is attached to its link moved back.
-                cost += 1.0 + attachments(self.theirs, b)
+        if self._is_beside(a, b, D):
+            # The joint must be moved and what is attached to its link moved back.
+            cost += _cost(self._has_equal_origins(a, b)) + attachments(self.theirs, b)
         return cost
+
+    def _is_beside(self, a: int, b: int, D: Floats) -> bool:
+        """Check whether the axis of body b on a revolute joint passes beside that of body a."""
+        if self.ours.kinds[a] != "revolute":
+            return False
+        off = float(np.linalg.norm(cross(D[:3, 3], self.ours.axes[a])))
+        return off > self.tolerance * self.length
+
+    def _place_cost(self, a: int, b: int, D: Floats) -> float:
+        """Return the cost of a joint's place for the frames D, unless it has that of its axis already."""
+        return 0.0 if self._is_beside(a, b, D) else _cost(self._has_equal_origins(a, b))
 
     def _observes(self, a: int) -> bool:
         return a != ROOT or self.ours.model.floating
@@ -555,12 +580,47 @@ class Matching:
             mine, other = self.ours.inertias[a], self.theirs.inertias[b]
             known = inertia_ratio(subtract(mine, other), mine, self.ours.whole) < NEARLY
             if a != ROOT:
-                scale = np.array([[1.0] * 3 + [1.0 / self.length]] * 3)
-                apart = (self.ours.placements[a] - self.theirs.placements[b])[:3] * scale
                 turned = np.abs(self.ours.axes[a] - self.theirs.axes[b])
-                known = known and max(float(np.max(np.abs(apart))), float(np.max(turned))) < NEARLY
+                known = known and self._are_placed_alike(a, b) and float(np.max(turned)) < NEARLY
+            else:
+                # A body of nearly equal moments looks the same in any frame; its joints do not.
+                children = self.theirs.children[b]
+                known = known and all(
+                    any(self._alike(i, j) and self._are_placed_alike(i, j, axes=True) for j in children)
+                    for i in self.ours.children[a]
+                )
             self._unmoved[a, b] = known
         return known
+
+    def _are_placed_alike(self, i: int, j: int, *, axes: bool = False) -> bool:
+        """Check whether two joints have nearly the same place in their parents; or, with `axes`, the same
+        axis, which may be opposite, or the same centre."""
+        T, S = self.ours.placements[i], self.theirs.placements[j]
+        if not axes:
+            return float(np.max(np.abs((T - S)[:3] * self._per_length))) < NEARLY
+        offset, sine, kind = (S - T)[:3, 3] / self.length, 0.0, self.ours.kinds[i]
+        if kind != "ball":
+            direction, other = T[:3, :3] @ self.ours.axes[i], S[:3, :3] @ self.theirs.axes[j]
+            sine = float(np.linalg.norm(cross(direction, other)))
+            offset = cross(offset, direction) if kind == "revolute" else np.zeros(3)
+        return max(float(np.linalg.norm(offset)), sine) < NEARLY
+
+    def _fits_turned(self, a: int, b: int) -> bool:
+        """Check whether two bodies that are nearly the same in the frames as they are fit in other frames, in
+        which more of their joints fit too: these are then the frames, slightly turned or moved."""
+        known = self._turned_fits.get((a, b))
+        if known is None:
+            least = self._bound(a, b, np.eye(4))
+            known = least > 0.0 and any(
+                self._is_near(D) and self._own_cost(a, b, D) == 0.0 and self._bound(a, b, D) <= least - 1.0
+                for D in islice(self._candidates_of(a, b), MAX_TURNED)
+            )
+            self._turned_fits[a, b] = known
+        return known
+
+    def _is_near(self, D: Floats) -> bool:
+        """Check whether a frame is slightly turned or moved."""
+        return float(np.max(np.abs((D - np.eye(4))[:3] * self._per_length))) <= NEARLY
 
     def _has_equal_origins(self, a: int, b: int) -> bool:
         return are_alike(self.ours.joints[a].origin, self.theirs.joints[b].origin)
@@ -642,13 +702,22 @@ def _cost(unchanged: bool) -> float:
 def attachments(skeleton: Skeleton, body: int) -> int:
     """Count what is attached to the child link of a body's joint: its inertia, and joints.
 
-    A link without mass on a joint beside a fixed one, as readers make for a joint off the origin of its
-    body, has nothing but that joint, which moves with the joint.
+    A link without mass on a joint beside a fixed one has nothing but that joint, which moves with the joint.
+    One that a reader makes has nothing: MJCF states points of joints in the body.
     """
-    link = skeleton.joints[body].child
-    joints = [joint for joint in skeleton.model.joints if joint.parent == link]
-    inertial = skeleton.model.inertial(link)
+    joint = skeleton.joints[body]
+    joints = [each for each in skeleton.model.joints if each.parent == joint.child]
+    inertial = skeleton.model.inertial(joint.child)
     heavy = bool(inertial.mass or inertial.tensor.any())
     if not heavy and len(joints) == 1 and not joints[0].moves:
         return 0
-    return heavy + len(joints)
+    return 0 if is_of_reader(skeleton.model, joint) else heavy + len(joints)
+
+
+def is_of_reader(model: Model, joint: Joint) -> bool:
+    """Check whether a reader makes the child link of a joint, without mass: for a joint beside the origin of
+    its body, or before another joint of the body."""
+    inertial = model.inertial(joint.child)
+    made = joint.moves and joint.line is not None and model.link(joint.child).line == joint.line
+    held = sum(each.parent == joint.child for each in model.joints)
+    return made and held == 1 and not (inertial.mass or inertial.tensor.any())

@@ -6,36 +6,18 @@ mended wherever they differ; in MJCF and SDF inertias, places of bodies and axes
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from xml.etree import ElementTree
-from xml.etree.ElementTree import tostring
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from dynx.model import Model
-from dynx.model.elements import Inertial, Joint, NamedConfiguration, Pose
-from dynx.model.equalities import StatedEquality
-from dynx.model.mjcf.equalities import EqualityWriter
-from dynx.model.mjcf.expansion import read_document
-from dynx.model.mjcf.sensor_objects import WORLD
-from dynx.model.mjcf.tendons import write_tendons
-from dynx.model.mjcf.writer import inertial_attributes
-from dynx.model.tendons import StatedTendon
-from dynx.model.xml.reading import Element
+from dynx.model.elements import Inertial, Joint, Pose
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.model.xml.text import quoteattr
+from dynx.same.mjcf_edits import MjcfEdits, stated_edits
 from dynx.same.stated_parts import StatedChange
+from dynx.same.text_edits import MOMENTS, NotMendedError, number, numbers
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import quat_from_rotation
-
-MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-
-_ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
-
-
-class NotMendedError(Exception):
-    """A change cannot be written into the text; the message says which."""
 
 
 def mended_text(source: XmlSource, before: Model, after: Model) -> XmlSource:
@@ -47,131 +29,29 @@ def mended_text(source: XmlSource, before: Model, after: Model) -> XmlSource:
         raise NotMendedError(
             f"a file whose root is <{source.root.tag}> is not mended; wanted URDF, MJCF or SDF"
         )
-    edits: _Urdf | _Mjcf | _Sdf
-    found: list[Edit] = []
-    if source.root.tag == "sdf":
-        edits = _Sdf(source)
-        found += edits.places(before, after)
+    edits: _Urdf | MjcfEdits | _Sdf
+    if source.root.tag == "robot":
+        edits = _Urdf(source)
     else:
-        edits = _Urdf(source) if source.root.tag == "robot" else _Mjcf(source, before)
-    for old, new in zip(before.joints, after.joints, strict=True):
-        if old != new:
-            found += edits.joint(old, new)
+        edits = MjcfEdits(source, before) if source.root.tag == "mujoco" else _Sdf(source)
+    found = [*edits.places(before, after)]
     for link, other in zip(before.links, after.links, strict=True):
         if link != other:
             found += edits.inertial(link.name, link.inertial, other.inertial)
     return source.apply(*found)
 
 
-def with_stated_parts(source: XmlSource, model: Model, changes: Sequence[StatedChange]) -> XmlSource:
-    """Return a text of MJCF in which tendons, constraints and keyframes are changed; `model` is its robot.
+def with_stated_parts(
+    source: XmlSource, before: Model, after: Model, changes: Sequence[StatedChange]
+) -> XmlSource:
+    """Return a text of MJCF in which tendons, constraints and keyframes of the robot `before` are changed,
+    which is to be `after`.
 
     Raises NotMendedError for a part that does not stand in the file itself.
     """
     if source.root.tag != "mujoco":
         raise NotMendedError(f"tendons, constraints and keyframes of <{source.root.tag}> are not mended")
-    found: list[Edit] = []
-    new: dict[str, list[str]] = {}
-    for each in changes:
-        written = None if each.new is None else _written(each, model)
-        old = None if each.old is None else _stated_element(source, each)
-        if old is None:
-            assert written is not None
-            new.setdefault(each.section, []).append(tostring(written, encoding="unicode"))
-        elif written is None:
-            found.append(source.removal(old))
-        else:
-            kept = {k: v for k, v in old.attributes.items() if k not in _STATED[each.section]}
-            written.attrib.update({k: v for k, v in kept.items() if k not in written.attrib})
-            found.append(source.replacement(old, tostring(written, encoding="unicode")))
-    for section, texts in new.items():
-        there = source.root.all(section)
-        if there:
-            found.append(source.insertion(there[0], "\n".join(texts)))
-        else:
-            lines = [f"<{section}>", *(f"  {text}" for text in texts), f"</{section}>"]
-            found.append(source.insertion(source.root, "\n".join(lines)))
-    return source.apply(*found)
-
-
-def _stated_element(source: XmlSource, change: StatedChange) -> SourceElement:
-    old = change.old
-    assert old is not None
-    for section in source.root.all(change.section):
-        for element in section.children:
-            if element.line == old.line and element.attributes.get("name", old.name) == old.name:
-                return element
-    raise NotMendedError(f"{change.words} does not stand in the file itself")
-
-
-_STATED = {
-    "tendon": frozenset(
-        (
-            *("range", "limited", "actuatorfrcrange", "actuatorfrclimited"),
-            *("stiffness", "springlength", "damping", "frictionloss", "armature"),
-        )
-    ),
-    "equality": frozenset(
-        (
-            *("body1", "body2", "site1", "site2", "joint1", "joint2", "tendon1", "tendon2"),
-            *("anchor", "relpose", "polycoef", "torquescale", "active", "solref", "solimp"),
-        )
-    ),
-    "keyframe": frozenset(("qpos",)),
-}
-"""Attributes that a part has instead of those in the file."""
-
-
-def _written(change: StatedChange, model: Model) -> ElementTree.Element:
-    """Return the element of a part, with what a default class may state otherwise."""
-    name: str = change.section
-    section, new = ElementTree.Element(name), change.new
-    if isinstance(new, StatedTendon):
-        write_tendons(section, [new])
-        given = section[0].attrib
-        for name in ("stiffness", "damping", "frictionloss", "armature"):
-            given.setdefault(name, "0")
-        for flag, ends in (("limited", "range"), ("actuatorfrclimited", "actuatorfrcrange")):
-            given[flag] = "true" if ends in given else "false"
-    elif isinstance(new, StatedEquality):
-        poses, reference = _pose_of_file(model)
-        if not EqualityWriter({}, poses, reference).write(section, new):
-            raise NotMendedError(f"{change.words}: its points do not coincide in the pose of the file")
-        section[0].attrib.setdefault("active", "true")
-    else:
-        assert isinstance(new, NamedConfiguration)
-        named = replace(model, stated_configurations=(new,))
-        q = named.configurations[new.name].copy()
-        for first in model.quaternions:
-            q[first : first + 4] = np.roll(q[first : first + 4], 1)  # w is the first in MJCF
-        ElementTree.SubElement(section, "key", name=new.name, qpos=numbers(q))
-    return section[0]
-
-
-def _pose_of_file(model: Model) -> tuple[dict[str, Floats], Callable[[str, str], float]]:
-    """Return the poses (4, 4) of links in the pose of the file, and what a joint or tendon has in it."""
-    from dynx.reference.backend import ReferenceBackend  # rarely needed
-
-    q = model.initial_configuration
-    poses = ReferenceBackend(model).forward_kinematics(q)
-    found = {frame.name: T for frame, T in zip(model.frames, poses, strict=True)} | {WORLD: np.eye(4)}
-    tendons = {each.name: each.terms for each in model.tendons or ()}
-
-    def reference(kind: str, name: str) -> float:
-        terms = ((name, 1.0),) if kind == "joint" else tendons[name]
-        return float(sum(factor * q[model.position_index(joint)] for joint, factor in terms))
-
-    return found, reference
-
-
-def number(value: float) -> str:
-    """Write a number so that it reads back exactly."""
-    return repr(float(value) + 0.0)
-
-
-def numbers(values: object) -> str:
-    """Write several numbers."""
-    return " ".join(number(value) for value in np.ravel(np.asarray(values)).tolist())
+    return source.apply(*stated_edits(source, before, after, changes))
 
 
 class _Urdf:
@@ -184,7 +64,13 @@ class _Urdf:
                 return element
         raise NotMendedError(f"<{tag}> {name} does not stand in the file itself")
 
-    def joint(self, old: Joint, new: Joint) -> Iterator[Edit]:
+    def places(self, before: Model, after: Model) -> Iterator[Edit]:
+        """Yield the edits of all joints."""
+        for old, new in zip(before.joints, after.joints, strict=True):
+            if old != new:
+                yield from self._joint(old, new)
+
+    def _joint(self, old: Joint, new: Joint) -> Iterator[Edit]:
         element = self._element("joint", old.name)
         if old.type != new.type:
             yield self._source.attribute_edit(element, "type", new.type)
@@ -267,87 +153,6 @@ class _Urdf:
             yield from self._set(present, "inertia", moments)
 
 
-class _Mjcf:
-    def __init__(self, source: XmlSource, model: Model) -> None:
-        self._source, self._model = source, model
-        self._bodies: dict[str, SourceElement] = {}
-        self._joints: dict[str, SourceElement] = {}
-        for element in source.root.walk():
-            name = element.attributes.get("name")
-            table = {"body": self._bodies, "joint": self._joints}.get(element.tag)
-            if table is not None and name is not None:
-                table.setdefault(name, element)
-        compilers = source.root.all("compiler")
-        self._from_geoms = any(each.attributes.get("inertiafromgeom") == "true" for each in compilers)
-
-    def _body(self, name: str) -> SourceElement:
-        element = self._bodies.get(name)
-        if element is None:
-            raise NotMendedError(f"body {name} has no name in the file, or stands in an included one")
-        return element
-
-    def joint(self, old: Joint, new: Joint) -> Iterator[Edit]:
-        if (old.type, old.mimic) != (new.type, new.mimic):
-            raise NotMendedError(f"the type or coupling of joint {old.name}: MJCF is not mended for it")
-        if old.axis != new.axis:
-            element = self._joints.get(old.name)
-            if element is None or element.parent is None or element.parent.tag != "body":
-                raise NotMendedError(f"joint {old.name} does not stand in its body in the file itself")
-            yield self._source.attribute_edit(element, "axis", numbers(new.axis))
-        if old.origin != new.origin:
-            yield from self._place(old, new)
-
-    def _place(self, old: Joint, new: Joint) -> Iterator[Edit]:
-        """Move the body of a joint: the first of its joints keeps its place in it."""
-        at: SourceElement | None
-        if old.moves:
-            joint = self._joints.get(old.name)
-            at = None if joint is None else joint.parent
-            first = at is not None and at.tag == "body" and at.all("joint")[0] is joint
-        else:
-            at = self._bodies.get(old.child)
-            first = at is not None and not at.all("joint")
-        if at is None or not first or at.parent is None or at.parent.tag not in ("body", "worldbody"):
-            # A fixed joint has no name in MJCF; its body has.
-            what = f"joint {old.name}" if old.moves else f"body {old.child}"
-            raise NotMendedError(f"the place of {what} does not follow from one <body> alone")
-        body = self._placement(at)
-        moved = new.origin.matrix @ np.linalg.inv(old.origin.matrix) @ body
-        x, y, z, w = quat_from_rotation(moved[:3, :3]).tolist()
-        values = {"pos": numbers(moved[:3, 3]), "quat": numbers((w, x, y, z))}
-        present = [name for name in values if name in at.attributes]
-        for name in present:
-            yield self._source.attribute_edit(at, name, values[name])
-        for name in _ORIENTATIONS[1:]:
-            if name in at.attributes:
-                yield self._source.attribute_removal(at, name)
-        new_ones = [name for name in values if name not in present]
-        if new_ones:
-            end = at.start_tag.start + 1 + len(at.tag)
-            written = "".join(f' {name}="{values[name]}"' for name in new_ones)
-            yield Edit(end, end, written)
-
-    def _placement(self, element: SourceElement) -> Floats:
-        """Return the pose (4, 4) of a body in its parent, as the reader of MJCF has it."""
-        document = read_document(self._source.text_with_lines_before, self._source.source)
-        assert document is not None
-        return document.pose(Element(element.tag, dict(element.attributes), element.line), "a body")
-
-    def inertial(self, link: str, old: Inertial | None, new: Inertial | None) -> Iterator[Edit]:
-        if self._from_geoms:
-            raise NotMendedError(f"the inertia of body {link} follows from its geoms")
-        if new is None:
-            raise NotMendedError(f"body {link} cannot be without an inertia in MJCF")
-        written = " ".join(f'{name}="{value}"' for name, value in inertial_attributes(new).items())
-        text = f"<inertial {written}/>"
-        body = self._body(link)
-        present = body.first("inertial")
-        if present is not None:
-            yield self._source.replacement(present, text)
-        else:
-            yield self._source.insertion(body, text, first=True)
-
-
 class _Sdf:
     """Edits of SDF: poses of links are in their model, so that a joint is moved with all links below it."""
 
@@ -366,15 +171,12 @@ class _Sdf:
             raise NotMendedError(f"<{tag}> {name} {where} the file itself")
         return found[0]
 
-    def joint(self, old: Joint, new: Joint) -> Iterator[Edit]:
-        # Its place and axis are written with all places.
-        if (old.type, old.mimic) != (new.type, new.mimic):
-            raise NotMendedError(f"the type or coupling of joint {old.name}: SDF is not mended for it")
-        return iter(())
-
     def places(self, before: Model, after: Model) -> Iterator[Edit]:
         """Yield the edits of axes of joints, and of poses of links whose places in the root link differ at
         position 0."""
+        for joint, new_joint in zip(before.joints, after.joints, strict=True):
+            if (joint.type, joint.mimic) != (new_joint.type, new_joint.mimic):
+                raise NotMendedError(f"the type or coupling of joint {joint.name}: SDF is not mended for it")
         old, new = _places(before), _places(after)
         for link in before.links:
             # A link that a joint with two axes adds stands in no file.

@@ -24,6 +24,7 @@ from dynx.same.scales import inertia_ratio
 from dynx.same.skeleton import Skeleton, float_inertia
 from dynx.spatial.inertia import RigidInertia, parameters_from_inertia
 from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import skew
 
 STATES, SEED = 24, 0
 """Number of random states at which the regressor is evaluated, and their seed."""
@@ -51,11 +52,31 @@ class Observability:
         # Differences are computed in 50 digits; what is seen of them needs no more than float64.
         self._mechanism = _rounded(skeleton.mechanism)
         self._aligned = align_frames(self._mechanism)
-        inertias = [self._aligned.root, *(body.inertia for body in self._aligned.bodies)]
         self._frames = {frame.body: (frame.R, frame.p) for frame in self._aligned.frames}
         self._reduced_bodies: list[int] = []
         self._reduced: Floats = np.zeros((0, 0))
-        self._own = {number: float_inertia(inertia) for number, inertia in enumerate(inertias, ROOT)}
+        self._own = self._scaling_inertias()
+
+    def _scaling_inertias(self) -> dict[int, RigidInertia]:
+        """Return the inertias of the bodies, of which differences have their scale: that of a body without
+        one is what bodies below it share with it."""
+        bodies = self._aligned.bodies
+        inertias = [self._aligned.root, *(body.inertia for body in bodies)]
+        own = {number: float_inertia(inertia) for number, inertia in enumerate(inertias, ROOT)}
+        grouped = dict(own)
+        for number in reversed(range(len(bodies))):
+            joint = bodies[number]
+            below = grouped[number]
+            _, shared = split_inertia(below, joint.revolute, joint.ball is not None)
+            if not joint.revolute and below.mass:
+                # The tensor of a slide counts about its centre of mass.
+                H = skew(below.first_moment)
+                shared = replace(shared, rotational_inertia=below.rotational_inertia + H @ H / below.mass)
+            grouped[joint.parent] = grouped[joint.parent] + shared.transform(joint.R, joint.p)
+        return {
+            number: inertia if inertia.mass or inertia.rotational_inertia.any() else grouped[number]
+            for number, inertia in own.items()
+        }
 
     def regrouped(self, body: int, difference: RigidInertia) -> Differences:
         """Move the parameters of a difference of one body of the skeleton to the bodies of the mechanism at

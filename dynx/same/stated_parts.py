@@ -15,12 +15,14 @@ from dynx.model.equalities import StatedEquality
 from dynx.model.mjcf.sensor_objects import WORLD
 from dynx.model.tendons import StatedTendon
 from dynx.same.attributes import StatedEffect
-from dynx.same.configurations import configuration_pairs, joints_of_other_kinds
-from dynx.same.constraints import equality_pairs, tendon_pairs_compared
+from dynx.same.configurations import ConfigurationPair, configuration_pairs, joints_of_other_kinds
+from dynx.same.constraints import Constraints, equality_pairs, tendon_pairs_compared
 from dynx.same.decimals import decimals, rounded
 from dynx.same.effects import SEED, STATES
 from dynx.same.fit import Fit
+from dynx.same.limits import differs
 from dynx.same.places import WORLD_BODY, Places
+from dynx.same.text_edits import are_near
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
@@ -71,13 +73,15 @@ class StatedParts:
         }
         for mine, other, equal in tendon_pairs_compared(*both):
             if not equal:
-                yield self._change("tendon", mine, other, None if mine is None else self._tendon(mine))
+                yield self._change("tendon", mine, other, None if mine is None else self._tendon(mine, other))
+        self._constraints = Constraints(*both)
         for held, by, equal in equality_pairs(*both):
             if not equal:
-                yield self._change("equality", held, by, None if held is None else self._equality(held))
-        for one, two, equal in configuration_pairs(*both):
-            if not equal:
-                yield self._change("keyframe", one, two, None if one is None else self._configuration(one))
+                yield self._change("equality", held, by, None if held is None else self._equality(held, by))
+        for pair in configuration_pairs(*both):
+            if not pair.equal:
+                new = None if pair.mine is None else self._configuration(pair)
+                yield self._change("keyframe", pair.mine, pair.other, new)
 
     def _change(
         self, section: Section, mine: StatedPart | None, old: StatedPart | None, new: StatedPart | None
@@ -92,13 +96,53 @@ class StatedParts:
 
     # -- what the second robot is to state ----------------------------------------------------------------
 
-    def _tendon(self, mine: StatedTendon) -> StatedTendon | None:
+    def _tendon(self, mine: StatedTendon, other: StatedTendon | None) -> StatedTendon | None:
+        """Return a tendon of the first robot, with the numbers of `other` that do not differ."""
         if any(joint not in self._coupled for joint in mine.joints):
             return None
-        terms = tuple((self._names[joint], self._fits[joint].sign * factor) for joint, factor in mine.terms)
-        return replace(mine, terms=terms)
+        factors = {self._names[joint]: self._fits[joint].sign * factor for joint, factor in mine.terms}
+        if other is None:
+            return replace(mine, terms=tuple(factors.items()))
+        old = dict(other.terms)
+        names = [*(name for name in old if name in factors), *(name for name in factors if name not in old)]
+        terms = tuple((name, self._kept(factors[name], old.get(name))) for name in names)
+        return replace(
+            mine,
+            terms=terms,
+            range=self._kept_ends(mine.range, other.range),
+            spring_length=self._kept_ends(mine.spring_length, other.spring_length),
+            force_range=self._kept_ends(mine.force_range, other.force_range),
+            stiffness=self._kept(mine.stiffness, other.stiffness),
+            damping=self._kept(mine.damping, other.damping),
+            friction=self._kept(mine.friction, other.friction),
+            armature=self._kept(mine.armature, other.armature),
+        )
 
-    def _equality(self, mine: StatedEquality) -> StatedEquality | None:
+    def _kept_ends(self, mine: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
+        low, high = map(self._kept, mine, other)
+        return low, high
+
+    def _kept(self, mine: float, other: float | None) -> float:
+        """Return the number of `other` if it does not differ, else that of `mine`."""
+        return mine if other is None or differs(mine, other, self._tolerance) else other
+
+    def _equality(self, mine: StatedEquality, other: StatedEquality | None) -> StatedEquality | None:
+        """Return a constraint of the first robot, with what `other` has of it."""
+        if other is not None and self._constraints.hold_the_same(mine, other):
+            return self._constraints.with_settings(mine, other)
+        new = self._equality_of_second(mine)
+        if new is None or other is None or new.type != other.type:
+            return new
+        new = self._constraints.with_settings(
+            new, replace(new, **{name: getattr(other, name) for name in _SETTINGS})
+        )
+        if new.objects != other.objects or new.type not in ("joint", "tendon"):
+            return new
+        pairs = zip(new.polynomial, other.absolute_polynomial.tolist(), strict=True)
+        a, b, c, d, e = (self._kept(one, two) for one, two in pairs)
+        return replace(new, polynomial=(a, b, c, d, e))
+
+    def _equality_of_second(self, mine: StatedEquality) -> StatedEquality | None:
         if mine.type in ("joint", "tendon"):
             names = self._coupled if mine.type == "joint" else self._tendons
             if any(each not in names for each in mine.objects):
@@ -152,11 +196,13 @@ class StatedParts:
         back = inverse(skeleton.link_pose(number)) @ inverse(each.D)
         return skeleton.model.links[number].name, rounded(back @ T)
 
-    def _configuration(self, mine: NamedConfiguration) -> NamedConfiguration:
-        """Return a configuration of the first robot in the joints of the second, with the types of the
-        first."""
-        theirs = self._theirs
+    def _configuration(self, pair: ConfigurationPair) -> NamedConfiguration:
+        """Return a configuration of the first robot in the joints of the second, with the types of the first,
+        and with the positions of its counterpart that do not differ."""
+        mine, theirs = pair.mine, self._theirs
+        assert mine is not None
         q, neutral = self._ours.configurations[mine.name], theirs.neutral()
+        kept = {} if pair.other is None else dict(pair.other.positions)
         other: dict[str, Floats] = {}
         for name in theirs.joint_names:
             if name not in self._other_kinds:
@@ -166,21 +212,38 @@ class StatedParts:
             if joint not in self._ours.joint_names or (name not in other and name not in self._other_kinds):
                 continue
             each, i = self._fits[joint], self._ours.position_index(joint)
-            if each.before is None:
+            if name in kept and joint not in pair.joints:
+                other[name] = np.array(kept[name])
+            elif each.before is None:
                 other[name] = each.sign * q[i : i + 1]
             else:
                 before, after = each.turns
+                if (before == np.eye(3)).all() and (after == np.eye(3)).all():
+                    other[name] = q[i : i + 4]
+                    continue
                 other[name] = quat_from_rotation(before.T @ rotation_from_quat(q[i : i + 4]) @ after.T)
         base = None
         if theirs.floating and self._ours.floating:
             T = homogeneous(rotation_from_quat(q[3:7]), q[:3]) @ rounded(self._found.bodies[0].D)
             base = (*T[:3, 3].tolist(), *quat_from_rotation(T[:3, :3]).tolist())
+            if pair.other is not None and pair.other.base is not None:
+                base = self._kept_of_base(base, pair.other.base) if pair.base else pair.other.base
         positions = tuple(
             (part.name, tuple((other[part.name] + 0.0).tolist()))
             for part in theirs.joints
             if part.name in other
         )
         return NamedConfiguration(mine.name, positions, base)
+
+    def _kept_of_base(self, mine: tuple[float, ...], other: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the pose of a base with the entries of `other` that do not differ."""
+        xyz = (two if are_near(one, two) else one for one, two in zip(mine[:3], other[:3], strict=True))
+        turned = np.abs(rotation_from_quat(np.array(mine[3:])) - rotation_from_quat(np.array(other[3:])))
+        return (*xyz, *(mine[3:] if turned.max() > self._tolerance else other[3:]))
+
+
+_SETTINGS = ("active", "torque_scale", "solref", "solimp")
+"""Fields of a constraint that are independent of what it couples."""
 
 
 def changed_model(theirs: Model, changes: Iterable[StatedChange]) -> Model:

@@ -19,27 +19,31 @@ def rebuilt(model: Model, links: Sequence[Link], joints: Sequence[Joint]) -> Mod
     return Model.build(model.name, links, joints, base=model.base, gravity=model.gravity)
 
 
-def random_rotation(rng: np.random.Generator) -> Floats:
+def random_rotation(rng: np.random.Generator, largest: float = 3.0) -> Floats:
+    """Return a rotation (3, 3) about a random axis by up to `largest` [rad]."""
     axis = rng.standard_normal(3)
-    return rotation_about(axis / np.linalg.norm(axis), np.asarray(rng.uniform(-3.0, 3.0)))
+    return rotation_about(axis / np.linalg.norm(axis), np.asarray(rng.uniform(-largest, largest)))
 
 
 def pose(T: Floats) -> Pose:
     return Pose.from_matrix(T)
 
 
-def with_moved_frames(model: Model, rng: np.random.Generator) -> Model:
-    """Give every link another frame: turned, and moved where its joint lets it be."""
+def with_moved_frames(
+    model: Model, rng: np.random.Generator, shift: float = 0.3, angle: float = 3.0
+) -> Model:
+    """Give every link another frame: turned by up to `angle` [rad], and moved by up to `shift` [m] along each
+    axis where its joint lets it be."""
     frames = {model.root: np.eye(4)}
     if model.floating:
-        frames[model.root] = homogeneous(random_rotation(rng), rng.uniform(-0.3, 0.3, 3))
+        frames[model.root] = homogeneous(random_rotation(rng, angle), rng.uniform(-shift, shift, 3))
     for joint in model.joints:
-        shift = rng.uniform(-0.3, 0.3, 3)
+        move = rng.uniform(-shift, shift, 3)
         if joint.type in ("revolute", "continuous"):
-            shift = np.array(joint.axis) * shift[0]
+            move = np.array(joint.axis) * move[0]
         if joint.type == "ball":
-            shift = np.zeros(3)
-        frames[joint.child] = homogeneous(random_rotation(rng), shift)
+            move = np.zeros(3)
+        frames[joint.child] = homogeneous(random_rotation(rng, angle), move)
     joints = []
     for joint in model.joints:
         X, Y = frames[joint.parent], frames[joint.child]

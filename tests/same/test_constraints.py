@@ -64,6 +64,12 @@ EQUAL = {
             'name="k"', 'name="k" ref="0.2"'
         ),
     ),
+    "rounding in a coefficient": (
+        document('<equality><joint joint1="j" joint2="k" polycoef="-0.455 0.778 0 -0.181 0"/></equality>'),
+        document(
+            '<equality><joint joint1="j" joint2="k" polycoef="-0.455 0.778 2e-17 -0.181 0"/></equality>'
+        ),
+    ),
     "a keyframe by a reversed axis": (
         document('<keyframe><key name="home" qpos="0.1 0.2 0.3"/></keyframe>'),
         document('<keyframe><key name="home" qpos="0.1 -0.2 0.3"/></keyframe>', "-1"),

@@ -160,15 +160,26 @@ def test_actuators_that_are_missing_renamed_or_written_otherwise() -> None:
     assert (found.kind, found.tag, found.ours, found.theirs) == ("name", "actuator", "p", "r")
 
 
-def test_a_motor_with_its_own_joint_reversed_keeps_the_sign_of_its_gear() -> None:
-    report = same_robot(
-        with_actuators('<motor joint="j" gear="2"/>'), with_actuators('<motor joint="j" gear="2"/>', "0 0 -1")
-    )
-    assert report.attributes == ()
-    (row,) = [each for each in report.coordinates if each.ours == "j"]
-    assert row.sign == -1
-    flipped = with_actuators('<motor joint="j" gear="-2"/>', "0 0 -1")
-    (found,) = same_robot(with_actuators('<motor joint="j" gear="2"/>'), flipped).attributes
+@pytest.mark.parametrize("motor", ['motor joint="j" gear="{}"', 'position joint="j" gear="{}" kp="3" kv="2"'])
+def test_a_motor_with_its_own_joint_reversed_keeps_its_command_or_the_sign_of_its_gear(motor: str) -> None:
+    """With the gear of the other sign, the same command gives the same effort on the same side."""
+    first = with_actuators(f"<{motor.format(2)}/>")
+    for gear in (2, -2):
+        report = same_robot(first, with_actuators(f"<{motor.format(gear)}/>", "0 0 -1"))
+        assert report.attributes == ()
+        (row,) = [each for each in report.coordinates if each.ours == "j"]
+        assert row.sign == -1
+    (found,) = same_robot(first, with_actuators(f"<{motor.format(-2)}/>")).attributes
+    assert found.kind == "actuator"
+
+
+@pytest.mark.parametrize(("gear", "ends"), [("2", "-3 1"), ("-2", "-1 3")])
+def test_ranges_of_commands_are_reversed_with_the_commands_alone(gear: str, ends: str) -> None:
+    motor = '<motor joint="j" gear="{}" ctrlrange="{}" ctrllimited="true"/>'
+    first = with_actuators(motor.format("2", "-1 3"))
+    assert same_robot(first, with_actuators(motor.format(gear, ends), "0 0 -1")).attributes == ()
+    swapped = " ".join(str(-float(each)) for each in reversed(ends.split()))
+    (found,) = same_robot(first, with_actuators(motor.format(gear, swapped), "0 0 -1")).attributes
     assert found.kind == "actuator"
 
 

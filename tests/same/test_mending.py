@@ -301,8 +301,110 @@ def test_the_place_of_a_joint_has_the_line_of_its_body() -> None:
     assert (each.part, each.second_line) == ("origin", number)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('name="elbow" axis="0 0 1"', 'name="elbow" pos="0 0.02 0" axis="0 0 1"'),
+        ('name="shoulder" axis="0 1 0"', 'name="shoulder" pos="0.01 0 0.02" axis="0 1 0"'),
+        ('name="shoulder" axis="0 1 0" range="-1 1"', 'name="shoulder" type="ball" pos="0 0.02 0"'),
+        ('name="elbow" axis="0 0 1"', 'name="elbow" ref="0.3" pos="0.1 0.02 0" axis="0 0 1"'),
+    ],
+)
+def test_the_point_of_a_joint_of_mjcf_is_mended_alone(old: str, new: str) -> None:
+    """The joint is moved in its body, and the body and all other joints stay."""
+    kind = ' type="ball"' if "ball" in new else ' ref="0.3"' if "ref" in new else ""
+    point = new.partition('pos="')[2].partition('"')[0]
+    first = BODIES.replace(old, new.replace(f' pos="{point}"', "") if kind else old)
+    second = BODIES.replace(old, new)
+    report = same_robot(first, second)
+    assert [each.part for each in report.differences] == ["origin"]
+    assert report.not_mended is None
+    assert report.mended_text is not None
+    (line,) = lines_changed(second, report.mended_text.decode())
+    zeros = [abs(float(each)) for each in line.partition('pos="')[2].partition('"')[0].split()]
+    assert zeros == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
+    assert line.replace(line.partition('pos="')[2].partition('"')[0], point) in second
+    assert same_robot(first, report.mended_text).same
+
+
+HAND = """<mujoco>
+  <worldbody>
+    <body name="palm">
+      <geom size="0.1" pos="0.05 0.02 0"/>
+      <joint name="turn" axis="0 1 0"/>
+      <body name="finger" pos="0.5 0 0.1" euler="20 0 0">
+        <geom type="box" size="0.1 0.05 0.02" pos="0.05 0.03 0.02"/>
+        <joint name="hinge" axis="0.6 0.8 0" pos="0.01 0.02 0.03"/>
+        <joint name="slide" type="slide" axis="1 0 0" ref="0.1"/>
+        <joint name="ball" type="ball" pos="{}"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("last", ["0 0 0", "0 0.1 0"])
+@pytest.mark.parametrize("shift", [1e-6, 1e-2])
+def test_the_point_of_one_of_several_joints_of_a_body_is_one_element(last: str, shift: float) -> None:
+    """The bodies and all other joints stay where they are."""
+    first = HAND.format(last)
+    second = first.replace("0.01 0.02 0.03", f"0.01 0.02 {0.03 + shift}")
+    report = same_robot(first, second)
+    assert [(each.part, each.theirs) for each in report.differences] == [("origin", "hinge")]
+    assert report.mended_text is not None
+    assert report.mended_text.decode() == first
+    second = HAND.format(last.replace("0 0", f"{shift} 0", 1))
+    report = same_robot(first, second)
+    assert [(each.part, each.theirs) for each in report.differences] == [("origin", "ball")]
+    assert report.mended_text is not None
+    (line,) = lines_changed(second, report.mended_text.decode())
+    assert 'name="ball"' in line
+    assert same_robot(first, report.mended_text).same
+
+
+def test_a_joint_beside_its_body_in_one_file_alone_is_no_difference() -> None:
+    """Also where joints have other names: the fixed joint that the reader adds has no counterpart."""
+    other = BODIES.replace('pos="0.5 0 0">', 'pos="0.4 0.1 0.2">').replace(
+        'pos="0 0 0" mass', 'pos="0.1 -0.1 -0.2" mass'
+    )
+    other = other.replace('"elbow"', '"other" pos="0.1 -0.1 -0.2"').replace('"shoulder"', '"another"')
+    for one, two in ((BODIES, other), (other, BODIES)):
+        report = same_robot(one, two)
+        assert report.same, (report.differences, report.unmatched)
+        assert {each.kind for each in report.attributes} == {"name"}
+
+
+def test_a_body_and_a_joint_in_frames_are_mended_in_the_frames() -> None:
+    framed = BODIES.replace('<body name="lower"', '<frame pos="0.1 0 0" euler="0 0 0.5"><body name="lower"')
+    framed = framed.replace("</body>\n    </body>", "</body></frame>\n    </body>")
+    joint = '<joint name="elbow" axis="0 0 1" range="-1 1"/>'
+    framed = framed.replace(joint, f'<frame pos="0 0.2 0" euler="0.4 0 0">{joint}</frame>')
+    for old, new in (
+        ('pos="0.5 0 0"', 'pos="0.5 0 0.01"'),
+        ('axis="0 0 1"', 'axis="0 0.1 1"'),
+        ('axis="0 0 1"', 'pos="0 0.03 0" axis="0 0 1"'),
+    ):
+        assert old in framed
+        report = same_robot(framed, framed.replace(old, new))
+        assert not report.same
+        assert report.mended_text is not None, report.not_mended
+        assert len(lines_changed(framed.replace(old, new), report.mended_text.decode())) == 1
+        assert same_robot(framed, report.mended_text).same
+
+
+def test_numbers_that_do_not_differ_stay_as_they_are_written() -> None:
+    first = BODIES.replace('pos="0.5 0 0"', 'pos="5e-1 +0.25 0.0"').replace('mass="0.5"', 'mass="5.0e-1"')
+    second = first.replace("+0.25", "0.26").replace('mass="1.5"', 'mass="1.6"')
+    report = same_robot(first, second)
+    assert report.mended_text is not None
+    assert report.mended_text.decode() == second.replace("0.26", "0.25").replace('mass="1.6"', 'mass="1.5"')
+
+
 def test_the_reason_names_a_body_of_the_file() -> None:
-    ball = BODIES.replace('name="shoulder" axis="0 1 0" range="-1 1"', 'name="shoulder" type="ball"')
-    report = same_robot(ball, ball.replace('type="ball"', 'type="ball" pos="0 0.02 0"'))
+    bodies = '<body name="upper" pos="0 0 0.3" euler="0.3 0 0">', '<body name="lower" pos="0.5 0 0">'
+    held = BODIES.replace(bodies[1], f'<replicate count="1">{bodies[1]}')
+    held = held.replace("</body>\n    </body>", "</body></replicate>\n    </body>")
+    report = same_robot(held, held.replace("0.5 0 0", "0.6 0 0"))
     assert report.mended_text is None
-    assert "the place of body upper " in str(report.not_mended)
+    assert "the place of joint elbow0 " in str(report.not_mended)

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.model import Model
-from dynx.model.elements import Inertial, Joint, JointType, Link, Mimic, Pose
+from dynx.model.elements import Inertial, Joint, JointType, Limits, Link, Mimic, Pose
 from dynx.model.library import find
 from dynx.same import SameReport, same_robot
 from dynx.testing import assert_same_robot
 from dynx.testing.strategies import models
-from tests.same.planted import Planted, other_mass, plantings, with_inertial, with_joint
+from tests.same.planted import Planted, moved_origin, other_mass, plantings, with_inertial, with_joint
 from tests.same.rewrites import (
     merged,
     rebuilt,
@@ -37,6 +37,7 @@ Rewrite = Callable[[Model, np.random.Generator], Model]
 
 REWRITES: dict[str, Rewrite] = {
     "frames moved": with_moved_frames,
+    "frames moved slightly": lambda model, rng: with_moved_frames(model, rng, 1e-3, 0.05),
     "axes reversed": with_flipped_axes,
     "inertias in other axes": with_turned_inertias,
     "links split": with_split_links,
@@ -94,6 +95,51 @@ def test_a_public_robot_rewritten_in_every_way_is_the_same(robot: str, base: str
     if base == "fixed":
         tau, back = torques(model, None, 0), torques(other, report, 0)
         assert back == pytest.approx(tau, rel=1e-9, abs=1e-9 * float(np.max(np.abs(tau))))
+
+
+@pytest.mark.parametrize("robot", ["g1", "talos", "ur5"])
+def test_frames_that_are_turned_slightly_are_no_difference(robot: str) -> None:
+    """Nearly the same as they are, and the same in the turned frames alone: of a floating base too."""
+    model = dynx.load(robot, base="fixed" if robot == "ur5" else "floating")
+    rng = np.random.default_rng(5)
+    report = same_robot(model, with_moved_frames(model, rng, 1e-3, 0.05))
+    assert report.same, (report.differences, report.unmatched)
+    other = moved_origin(model, model.joint(model.joint_names[2]), 1e-6, 1.0, rng)
+    report = same_robot(model, with_moved_frames(other.model, rng, 1e-3, 0.05))
+    assert [(each.part, each.theirs) for each in report.differences] == [("origin", other.name)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_floating_base_of_nearly_equal_moments_may_have_any_frame(seed: int) -> None:
+    base = Link("a", Inertial(2.0, Pose(), 0.1, 0.0, 0.0, 0.101, 0.0, 0.102))
+    child = Link("b", Inertial(1.0, Pose((0.1, 0.2, 0.3)), 0.1, 0.01, 0.02, 0.2, 0.03, 0.25))
+    joints = [Joint("j", "continuous", "a", "b", Pose((0.2, 0.1, 0.05)), axis=(0.0, 0.0, 1.0))]
+    model = dynx.Model.build("r", [base, child], joints, base="floating")
+    assert same_robot(model, with_moved_frames(model, np.random.default_rng(seed), 0.01)).same
+
+
+def test_a_moment_below_a_slide_on_a_link_without_mass_is_seen() -> None:
+    """The turning joint above sees it, with the scale of the body that has it."""
+    links = [
+        Link("a"),
+        Link("b", Inertial()),
+        Link("c", Inertial(4.0, Pose((0.1, 0.2, 0.3)), 0.1, 0.01, 0.02, 0.2, 0.03, 0.25)),
+    ]
+    joints = [
+        Joint(
+            "turn", "revolute", "a", "b", Pose((0.1, 0.0, 0.2)), axis=(0.6, 0.0, 0.8), limits=Limits(-1, 1)
+        ),
+        Joint(
+            "slide", "prismatic", "b", "c", Pose((0.5, 0.2, 0.0)), axis=(0.0, 1.0, 0.0), limits=Limits(-1, 1)
+        ),
+    ]
+    model = dynx.Model.build("r", links, joints)
+    inertial = links[2].inertial
+    assert inertial is not None
+    for size in (1e-8, 1e-7, 1e-3):
+        other = with_inertial(model, "c", replace(inertial, izz=inertial.izz * (1.0 + size)))
+        report = same_robot(model, other, tolerance=1e-10)
+        assert [(each.part, each.theirs) for each in report.differences] == [("inertial", "c")]
 
 
 def test_names_are_matched_by_structure() -> None:

@@ -122,6 +122,53 @@ def test_effects_are_those_of_closed_forms() -> None:
     assert home["position of a link"] == pytest.approx(2.0 * np.sin(0.1) * np.hypot(0.2, 0.3))
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "mended"),
+    [
+        ("0.1 0.2 1 0 0 0", "1e-1 -.40  2 0 0 0", "1e-1 0.2  2 0 0 0"),
+        ("0.1 0.2 0.8 0.6 0 0", "1.0E-1 .2 1 0 0 0", "1.0E-1 .2 0.8 0.6 0 0"),
+        ("0.1 0.2 1 0 0 0", "0.3", "0.1 0.2"),
+    ],
+)
+def test_only_the_entries_of_a_keyframe_that_differ_are_changed(first: str, second: str, mended: str) -> None:
+    text = robot(keyframe(second).replace("/></key", ' qvel="1 2 3 4 5" ctrl=""/></key'))
+    report = same_robot(robot(keyframe(first)), text)
+    assert report.mended_text is not None
+    assert report.mended_text.decode() == text.replace(f'"{second}"', f'"{mended}"')
+
+
+def test_only_the_attributes_of_a_tendon_that_differ_are_changed() -> None:
+    given = 'stiffness="{}" springlength="+0.5" range="-1.0 {}" limited="true"'
+    text = robot(tendon(2.0, given.format("12.0", "2")))
+    for stiffness, end, factor in (("10.0", "2", 2.0), ("12.0", "3", 2.0), ("12.0", "2", 2.5)):
+        report = same_robot(robot(tendon(factor, given.format(stiffness, end))), text)
+        assert report.mended_text is not None
+        wanted = tendon(factor, given.format(float(stiffness), end if end == "2" else float(end)))
+        assert report.mended_text.decode() == robot(wanted)
+
+
+@pytest.mark.parametrize("stiffness", [0, 3])
+def test_the_length_of_a_spring_of_a_tendon_follows_its_coefficients(stiffness: float) -> None:
+    spring = f'name="j" stiffness="{stiffness}" springref="0.5"'
+    one, two = (robot(tendon(factor, 'stiffness="10"')) for factor in (2.0, 3.0))
+    first, second = (each.replace('name="j"', spring) for each in (one, two))
+    report = same_robot(first, second)
+    assert report.mended_text is not None
+    assert same_robot(first, report.mended_text).attributes == ()
+    # Without a spring at the joint, a model does not keep its reference.
+    if stiffness:
+        assert report.mended_text.decode() == first
+
+
+def test_settings_of_a_constraint_are_mended_alone() -> None:
+    site = '<site name="s" pos="0.1 0 0"/><joint name="k"'
+    text = robot(equality('<connect name="e" site1="s" site2="w" solref="0.02 1"/>'))
+    text = text.replace('<joint name="k"', site).replace("<body", '<site name="w"/><body', 1)
+    report = same_robot(text, text.replace("0.02 1", "0.03 1"))
+    assert report.mended_text is not None
+    assert report.mended_text.decode() == text
+
+
 def test_a_part_of_a_file_that_is_included_is_named_in_a_note(tmp_path: Path) -> None:
     (tmp_path / "parts.xml").write_text(f"<mujoco>{tendon(3.0)}</mujoco>")
     (tmp_path / "robot.xml").write_text(robot('<include file="parts.xml"/>'))

@@ -17,8 +17,9 @@ from dynx.model.xml.reading import Element
 
 UNBOUNDED = (-INFINITY, INFINITY)
 
-_AUTOMATIC = (-1.0, -1.0)
+AUTOMATIC_LENGTH = -1.0
 """``springlength`` for which MuJoCo takes the length with all joints at their ``springref``."""
+_AUTOMATIC = (AUTOMATIC_LENGTH, AUTOMATIC_LENGTH)
 
 
 def read_tendons(
@@ -133,13 +134,27 @@ def _range(document: MjcfText, element: Element, limited: str, ends: str, what: 
     return low if low > -UNLIMITED else -INFINITY, high if high < UNLIMITED else INFINITY
 
 
+def limited_range(ends: tuple[float, float]) -> tuple[float, float]:
+    """Return a range in numbers that MuJoCo has."""
+    return max(ends[0], -UNLIMITED), min(ends[1], UNLIMITED)
+
+
+def spring_length_text(tendon: StatedTendon) -> str:
+    """Write the lengths without a spring force.
+
+    The pair that MuJoCo would compute anew is moved by rounding.
+    """
+    nearby = [math.nextafter(end, 0.0) for end in _AUTOMATIC]
+    return text(nearby if tendon.spring_length == _AUTOMATIC else tendon.spring_length)
+
+
 def write_tendons(section: Written, tendons: Iterable[StatedTendon]) -> None:
     """Add tendons to a section ``<tendon>``."""
     for each in tendons:
         given = {"name": each.name} if each.name else {}
         for attribute, ends in (("range", each.range), ("actuatorfrcrange", each.force_range)):
             if ends != UNBOUNDED:
-                given[attribute] = text((max(ends[0], -UNLIMITED), min(ends[1], UNLIMITED)))
+                given[attribute] = text(limited_range(ends))
         numbers = {
             "stiffness": each.stiffness,
             "damping": each.damping,
@@ -148,9 +163,7 @@ def write_tendons(section: Written, tendons: Iterable[StatedTendon]) -> None:
         }
         given |= {name: text(value) for name, value in numbers.items() if value}
         if each.stiffness:
-            # The pair that MuJoCo would compute anew is moved by rounding.
-            nearby = [math.nextafter(end, 0.0) for end in _AUTOMATIC]
-            given["springlength"] = text(nearby if each.spring_length == _AUTOMATIC else each.spring_length)
+            given["springlength"] = spring_length_text(each)
         tendon = SubElement(section, "fixed", given)
         for joint, factor in each.terms:
             SubElement(tendon, "joint", joint=joint, coef=text(factor))

@@ -55,12 +55,13 @@ class Reading:
                 self._ignored[parent.tag, child.tag] = (count + 1, line)
 
     def note_ignored(self) -> None:
-        """Convert the counts of `ignore_unknown` to notes."""
+        """Convert the counts of `ignore_unknown` since the last call to notes."""
         for (inside, tag), (count, line) in self._ignored.items():
             times = "" if count == 1 else f" ({count} times)"
             why = _WHY_IGNORED.get(tag, _XACRO if tag.startswith("xacro:") else "")
             message = f"unknown element <{escaped(tag)}> in <{inside}> was ignored{times}{why}"
             self.notes.append(Note(message, line))
+        self._ignored.clear()
 
     def only(self, parent: Element, tag: str) -> Element | None:
         """Return the element of that tag, or None; the first, with a note, if there are several."""

@@ -182,6 +182,13 @@ def test_each_unknown_element_and_attribute_is_an_error_or_named(what: str) -> N
     assert silent == set()
 
 
+def test_an_unknown_section_has_one_note() -> None:
+    notes = dynx.load(document().replace("<worldbody>", "<world/><world/><worldbody>", 1)).notes
+    assert [each.message for each in notes if "unknown" in each.message] == [
+        "unknown element <world> in <mujoco> was ignored (2 times)"
+    ]
+
+
 def test_what_has_an_effect_in_mujoco_is_named_with_its_line() -> None:
     text = document().replace('<geom name="g2"', '<geom name="g2" solref="0.1 1" margin="0.1"')
     text = text.replace('<joint name="k"', '<joint name="k" margin="0.1"')
