@@ -18,6 +18,7 @@ from dynx.model.xml.several_files import file_of_line
 from dynx.same.decimals import rounded
 from dynx.same.fit import BodyFit, Fit, angle_of
 from dynx.same.limits import differs, limit_pairs
+from dynx.same.matching import is_of_reader
 from dynx.same.scales import inertia_ratio
 from dynx.same.shapes import NEGLIGIBLE, SHAPE_KINDS, MatchedShapes, ShapeKind, ShapeOfBody, matched_shapes
 from dynx.same.skeleton import float_inertia, subtract, transformed
@@ -186,8 +187,11 @@ def _of_links(ours: Model, theirs: Model, found: Fit, each: BodyFit, tolerance: 
     mine = {ours.links[k].name: k for k in found.ours.links[each.ours]}
     other = {theirs.links[k].name: k for k in found.theirs.links[each.theirs]}
     if each.ours != ROOT:
-        first, second = found.ours.joints[each.ours].child, found.theirs.joints[each.theirs].child
-        if first != second and first not in other and second not in mine:
+        joint, their_joint = found.ours.joints[each.ours], found.theirs.joints[each.theirs]
+        first, second = joint.child, their_joint.child
+        # Links that a reader makes stand in no file.
+        made = is_of_reader(ours, joint) or is_of_reader(theirs, their_joint)
+        if first != second and first not in other and second not in mine and not made:
             lines = ours.link(first).line, theirs.link(second).line
             yield Attribute("name", "link", first, second, first, second, *lines)
             mine.pop(first)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -268,38 +270,103 @@ def compensation_differences(ours: Model, theirs: Model, found: Fit, tolerance: 
     Factors of links that are merged count by their masses."""
     if ours.gravity_compensation is None or theirs.gravity_compensation is None:
         return
+    reach = np.array([1.0, *[found.ours.reach or 1.0] * 3])
+    differing: dict[int, tuple[_Compensation, _Compensation]] = {}
     for each in found.bodies:
         mine, other = (_compensated(model, found, each, k) for k, model in enumerate((ours, theirs)))
         if mine is None or other is None:
             continue
-        size = max(1.0, float(np.abs(mine[0]).max()), float(np.abs(other[0]).max()))
-        reach = np.array([1.0, *[found.ours.reach or 1.0] * 3])
-        if (np.abs(mine[0] - other[0]) <= tolerance * size * reach).all():
-            continue
-        texts = mine[1], other[1] if other[1] != mine[1] else f"placed otherwise: {other[1]}"
-        yield Attribute("gravity compensation", "link", mine[2], other[2], *texts, mine[3], other[3])
+        relative = mine.moment / mine.mass, other.moment / other.mass
+        size = max(1.0, float(np.abs(relative[0]).max()), float(np.abs(relative[1]).max()))
+        limit = tolerance * size * reach
+        # Mass without compensation may be described at another body.
+        same = np.abs(relative[0] - relative[1]) <= limit
+        if not (same.all() or (np.abs(mine.moment - other.moment) <= mine.mass * limit).all()):
+            differing[each.ours] = mine, other
+    for body in _seen_compensation(found, differing, tolerance):
+        mine, other = differing[body]
+        texts = mine.words, other.words if other.words != mine.words else f"placed otherwise: {other.words}"
+        yield Attribute("gravity compensation", "link", mine.link, other.link, *texts, mine.line, other.line)
 
 
-def _compensated(
-    model: Model, found: Fit, each: BodyFit, number: int
-) -> tuple[Floats, str, str, int | None] | None:
-    """Return the mass that is compensated and its first moment (4,), relative to the mass of the body, in the
-    axes of our body, then a text, the link and its line; None for a body without mass or of the world."""
+class _Compensation(NamedTuple):
+    """Mass [kg] and first moment [kg m] (4,) of a body that are compensated, and those of the whole body, in
+    the axes of our body; the factor, None for several; then a text, and the link with its line."""
+
+    moment: Floats
+    whole: Floats
+    factor: float | None
+    words: str
+    link: str
+    line: int | None
+
+    @property
+    def mass(self) -> float:
+        """Mass of the body [kg]."""
+        return float(self.whole[0])
+
+
+def _seen_compensation(
+    found: Fit, differing: Mapping[int, tuple[_Compensation, _Compensation]], tolerance: float
+) -> list[int]:
+    """Return the fewest of the bodies without which no state shows a difference, or all of them if two do not
+    suffice: compensated mass on the axis of a joint may as well be the parent's."""
+    reach = np.array([1.0, *[found.ours.reach or 1.0] * 3])
+    moments = [each.moment for pair in differing.values() for each in pair]
+    limit = tolerance * reach * max((float(np.max(np.abs(each) / reach)) for each in moments), default=0.0)
+
+    def shown_without(left_out: tuple[int, ...]) -> bool:
+        total = {body: np.zeros(4) for body in found.ours.children}
+        for body, (mine, other) in differing.items():
+            # One that is left out has our factor.
+            if body not in left_out:
+                total[body] += mine.moment - other.moment
+            elif mine.factor is not None:
+                total[body] += mine.moment - mine.factor * other.whole
+        for body in reversed(range(len(found.ours.bodies))):
+            moment, axis, T = total[body], found.ours.axes[body], found.ours.placements[body]
+            kind, shared = found.ours.kinds[body], moment.copy()
+            if kind == "revolute":
+                shared[1:] = axis * float(axis @ moment[1:])
+            elif kind == "ball":
+                shared[1:] = 0.0
+            else:
+                shared[0] = 0.0
+            kept = moment - shared
+            if (np.abs(kept) > limit).any():
+                return True
+            parent = total[found.ours.bodies[body].parent]
+            parent[0] += shared[0]
+            parent[1:] += T[:3, :3] @ shared[1:] + T[:3, 3] * shared[0]
+        # Of a fixed base no state shows it; what is compensated in one description alone is listed.
+        return bool((np.abs(total[ROOT]) > limit).any())
+
+    for count in range(3):
+        for left_out in combinations(differing, min(count, len(differing))):
+            if not shown_without(left_out):
+                return list(left_out)
+    return list(differing)
+
+
+def _compensated(model: Model, found: Fit, each: BodyFit, number: int) -> _Compensation | None:
+    """Return what is compensated of a body of our or their robot; None without mass, and for the world."""
     skeleton, body = (found.ours, each.ours) if number == 0 else (found.theirs, each.theirs)
     if body == ROOT and not model.floating:
         return None
     stated = {one.link: one for one in model.gravity_compensation or ()}
     heavy = skeleton.heavy_links[body]
-    mass = sum(float(inertia.mass) for inertia in heavy.values())
-    if not mass:
+    if not sum(float(inertia.mass) for inertia in heavy.values()):
         return None
     D = rounded(each.D) if number else np.eye(4)
-    total, words = np.zeros(4), []
+    total, whole, factors = np.zeros(4), np.zeros(4), []
     for name, inertia in heavy.items():
-        factor = stated[name].factor if name in stated else 0.0
+        factors.append(stated[name].factor if name in stated else 0.0)
         moment = D[:3, :3] @ inertia.first_moment + inertia.mass * D[:3, 3]
-        total += factor * np.array([inertia.mass, *moment]) / mass
-        words.append(number_text(factor))
+        total += factors[-1] * np.array([inertia.mass, *moment])
+        whole += np.array([inertia.mass, *moment])
+    several = list(dict.fromkeys(factors))
+    words = " and ".join(map(number_text, several))
     link = next((name for name in heavy if name in stated), next(iter(heavy)))
     line = stated[link].line if link in stated else model.link(link).line
-    return total, " and ".join(dict.fromkeys(words)), link, line
+    factor = several[0] if len(several) == 1 else None
+    return _Compensation(total, whole, factor, words, link, line)

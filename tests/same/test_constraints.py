@@ -286,3 +286,34 @@ def test_a_mimic_joint_and_a_coupling_of_joints_are_named_together() -> None:
     report = same_robot(mimic, coupled)
     assert not report.same
     assert any("equality constraint" in each and "mimic" in each for each in report.notes)
+
+
+MASSES = """<mujoco><worldbody><body name="b"><freejoint/>
+<inertial mass="{}" pos="0 {} 0" fullinertia="{} 1 {} 0 0 0"/>
+<body name="c" pos="0.1 0 0" gravcomp="0.5"><inertial mass="1" pos="0 0 0" diaginertia="0.1 0.1 0.1"/></body>
+<body name="l" pos="0 0.3 0" gravcomp="{}"><joint name="j" axis="0 0 1"/>
+<inertial mass="{}" pos="0.1 0 0" diaginertia="0.5 0.5 0.5"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("factor", ["0", "0.5"])
+def test_mass_on_an_axis_is_compensated_at_either_body(factor: str) -> None:
+    """Half a kilogram on the axis of j belongs to the body l or to its parent; both have the factor."""
+    first = MASSES.format(4.0, 0.0, 1.0, 1.0, factor, 2.0)
+    center = 0.5 * 0.3 / 4.5
+    moment = 1.0 + 4.0 * center**2 + 0.5 * (0.3 - center) ** 2
+    second = MASSES.format(4.5, center, moment, moment, factor, 1.5)
+    # The child keeps its first moment about the axis, and its moment about the axis.
+    second = second.replace('pos="0.1 0 0" diag', f'pos="{0.2 / 1.5} 0 0" diag')
+    about = 0.5 + 2.0 * 0.01 - 1.5 * (0.2 / 1.5) ** 2
+    second = second.replace('"0.5 0.5 0.5"', f'"0.5 {about} {about}"')
+    if factor != "0":
+        first, second = (
+            each.replace('name="b"', f'name="b" gravcomp="{factor}"') for each in (first, second)
+        )
+    report = same_robot(first, second)
+    assert report.same
+    assert [each for each in report.attributes if each.kind == "gravity compensation"] == []
+    stated = f'name="l" pos="0 0.3 0" gravcomp="{factor}"'
+    other = second.replace(stated, stated.replace(f'"{factor}"', '"0.7"'))
+    found = [each for each in same_robot(first, other).attributes if each.kind == "gravity compensation"]
+    assert [each.theirs for each in found] == ["l"]
