@@ -291,3 +291,26 @@ def test_pybullet_finds_a_robot_without_joints_beside_a_floor(tmp_path: Path) ->
     with load_as("pybullet", path, model, ["pybullet.no_contacts"]) as free:
         assert not free.contacts(q)
         np.testing.assert_allclose(free.forward_dynamics(q, zero, zero), wanted, atol=1e-12)
+
+
+NEAR_AXES = {
+    "mjcf": (
+        '<mujoco model="near"><worldbody><body name="base"><freejoint/><geom size="0.1" mass="1"/>'
+        '<body name="arm" pos="0 0 1"><joint name="turn" type="hinge" axis="1e-9 0 1"/>'
+        '<geom pos="0.2 0 0" size="0.1" mass="1"/></body></body></worldbody></mujoco>'
+    ),
+    "sdf": (
+        '<sdf version="1.6"><model name="near"><link name="base"/><link name="arm"><pose>0 0 1 0 0 0</pose>'
+        '</link><joint name="turn" type="revolute"><parent>base</parent><child>arm</child><axis>'
+        "<xyz>1e-9 0 1</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis></joint></model></sdf>"
+    ),
+}
+
+
+@needs_all
+@pytest.mark.parametrize("form", NEAR_AXES)
+def test_an_axis_near_a_coordinate_axis_is_named_in_every_format(form: str) -> None:
+    """Drake takes z for it."""
+    report = diagnose(NEAR_AXES[form], engines=["drake"], counterexamples=False)
+    assert [(each.rule, each.joint) for each in report.differences] == [("DX226", "turn")]
+    assert not report.unexplained

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
 from dynx.errors import escaped, shown
-from dynx.model.elements import Joint
-from dynx.model.xml.source import SourceElement
+from dynx.model.document_format import Format
+from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules import (
     EVERY_ENGINE,
     Case,
     Correction,
+    Detection,
     EditingRule,
     correction,
     found_at,
@@ -29,6 +32,7 @@ from dynx.rules.joints import (
     misspelled_direction,
     mujoco_reads,
 )
+from dynx.rules.mjcf import bodies_in_text, mjcf_text, with_defaults
 from dynx.rules.numbers_in_text import decimal, is_number
 
 _ROUNDING_OF_LENGTH = 1e-15
@@ -229,7 +233,8 @@ class AxisNearlyAligned(EditingRule):
     code for axes along x, y and z. They use it if an axis is almost a coordinate axis, within a tolerance.
 
     - Drake 1.51.1 uses the coordinate axis if a component of the unit axis rounds to more than 1 - 2.2e-16.
-      The deviation is then below about 1.8e-8 rad. This applies to revolute, continuous and prismatic joints.
+      The deviation is then below about 1.8e-8 rad. This applies to revolute, continuous and prismatic joints,
+      also from MJCF and SDF.
     - Pinocchio 4.1.0 uses the coordinate axis up to a deviation of 1e-12.
     - Both engines do this only for positive directions. For example, they keep the axis ``1.6e-10 0 -1``.
     - PyBullet 3.2.7, MuJoCo 4.0.0 and dynx use all numbers.
@@ -240,6 +245,7 @@ class AxisNearlyAligned(EditingRule):
     report says that the physics changed by less than 2e-8. ``--choose DX226=keep`` leaves the axis.
     """
 
+    formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf", "sdf")
     engines = measured_on("pinocchio", "drake")
     advice = "Write the coordinate axis."
     choices = {
@@ -250,21 +256,58 @@ class AxisNearlyAligned(EditingRule):
     changes_physics = True
 
     def corrections(self, case: Case) -> Iterable[Correction]:
-        """Yield the axes of revolute, continuous and prismatic joints."""
-        for element, axis in elements_in_joints(case, "axis", SINGLE):
-            joint = case.model.joint(element.attributes["name"])
-            name, deviation = nearest_axis(joint)
+        """Yield the axes of joints that turn about one axis or slide."""
+        for place, axis, aligned in _axes(case):
+            name, deviation = nearest_axis(axis)
             if not _NEGLIGIBLE_DEVIATION < deviation < DRAKE_DEVIATION:
                 continue
             message = f"the axis is {deviation:.2g} rad off {name}"
             engines = ["Drake"] if deviation > PINOCCHIO_DEVIATION else ["Pinocchio", "Drake"]
             clauses = tuple((engine.lower(), f"exactly {name} in {engine}") for engine in engines)
-            found = replace(found_at(axis, message), engine_clauses=clauses)
-            yield Correction(found, (axis_edit(case.source, element, AXES[name]),))
+            found = replace(place, message=message, engine_clauses=clauses)
+            yield Correction(found, (aligned(AXES[name]),))
 
 
-def nearest_axis(joint: Joint) -> tuple[str, float]:
-    """Find the coordinate axis nearest to the axis of a joint, and the deviation [rad] from it."""
-    name, largest = max(zip(AXES, joint.axis, strict=True), key=lambda pair: pair[1])
-    others = [value for each, value in zip(AXES, joint.axis, strict=True) if each != name]
+def _axes(case: Case) -> Iterator[tuple[Detection, Sequence[float], Callable[[str], Edit]]]:
+    """Yield the axes in the text of a case: where each is, its numbers, and the edit that writes others."""
+    source = case.source
+    if case.form == "urdf":
+        for element, axis in elements_in_joints(case, "axis", SINGLE):
+            joint = case.model.joint(element.attributes["name"])
+            yield found_at(axis, ""), joint.axis, partial(axis_edit, source, element)
+    elif case.form == "mjcf":
+        document = mjcf_text(case)
+        for body in bodies_in_text(case, document):
+            for element in body.children("joint"):
+                attributes = with_defaults(document, element, body.childclass)
+                numbers = _three_numbers(attributes.get("axis", "0 0 1"))
+                if attributes.get("type", "hinge") in ("hinge", "slide") and numbers is not None:
+                    place = Detection(None, element.attributes.get("name"), element.line, "")
+                    yield place, numbers, partial(source.attribute_edit, element, "axis")
+    else:
+        for part in source.root.walk():
+            model = part.parent
+            nested = model is not None and model.parent is not None and model.parent.tag == "model"
+            axes = [*part.all("axis"), *part.all("axis2")] if part.tag == "joint" else []
+            for xyz in (each for found in axes for each in found.all("xyz")):
+                numbers = _three_numbers(source.text_in(xyz))
+                # The numbers of an axis in another frame are not those of its joint.
+                if numbers is not None and "expressed_in" not in xyz.attributes:
+                    place = Detection(None, None if nested else part.attributes.get("name"), xyz.line, "")
+                    yield place, numbers, partial(_xyz_edit, source, xyz)
+
+
+def _xyz_edit(source: XmlSource, xyz: SourceElement, axis: str) -> Edit:
+    return source.replacement(xyz, f"<xyz>{axis}</xyz>")
+
+
+def _three_numbers(text: str) -> list[float] | None:
+    words = text.split()
+    return [float(word) for word in words] if len(words) == 3 and all(map(is_number, words)) else None
+
+
+def nearest_axis(axis: Sequence[float]) -> tuple[str, float]:
+    """Find the coordinate axis nearest to an axis, and the deviation [rad] from it."""
+    name, largest = max(zip(AXES, axis, strict=True), key=lambda pair: pair[1])
+    others = [value for each, value in zip(AXES, axis, strict=True) if each != name]
     return name, math.atan2(math.hypot(*others), largest)
