@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from dynx.compiled.contact_step import refuse_other_joints, shapes_on_plane
 from dynx.compiled.simplification import simplify_mechanism
-from dynx.compiled.step import BoundSteps, StepText, compiled
+from dynx.compiled.step import StepText, compiled
 from dynx.envs.ground_task import GroundTask
 from dynx.envs.library import Space
 from dynx.envs.stops import LimitWatch, StopsText
@@ -30,6 +30,7 @@ from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
 from dynx.rbd.base_parameters import regroup_inertias
 from dynx.rbd.contact_step import ServoJoints, ShapesOnPlane, Sweeps, contact_step
+from dynx.simd.call_sequence import CallSequence, StridedRows
 from dynx.simd.kernel import Kernel
 from dynx.simd.target import host
 from dynx.simd.threads import run_parts
@@ -390,7 +391,14 @@ class GroundLanes(TaskLanes):
                 "steps": (steps[:, part], 1 - turns),
             }
             self._chunks.append(
-                BoundSteps(kernels, chosen, known, outputs, first=0, lanes=last - first, status=None)
+                CallSequence(
+                    kernels,
+                    chosen,
+                    {name: StridedRows(*each) for name, each in known.items()},
+                    last - first,
+                    outputs={name: StridedRows(*each) for name, each in outputs.items()},
+                    status="beyond" if step.stops else None,
+                )
             )
         self.flags: NDArray[np.int64] = self.arrays["flags"][:count, 0].view(np.int64)
 
@@ -407,16 +415,16 @@ class GroundLanes(TaskLanes):
     def _evaluate(self, chunk: int, begin: int) -> None:
         """Evaluate a control step of a chunk of environments, from a call on."""
         steps, end = self._chunks[chunk], begin + self._per_turn
-        if self._ground.stops:
-            part = slice(self._edges[chunk], self._edges[chunk + 1])
+        part = slice(self._edges[chunk], self._edges[chunk + 1])
+        while begin < end:
+            stopped = steps.run(begin, end)
+            # A lane that diverges has NaN beyond its stops, which does not end the calls.
+            # The task, which is last, leaves what the step of the robot before it found beyond stops.
+            if stopped is None or stopped[0] == end - 1:
+                return
             beyond = self.arrays["beyond"][part, 0]
-            while begin < end - 1:
-                steps.run(begin, begin + 1)
-                # Not by the largest: that of a lane that diverges is NaN.
-                if (beyond > 0.0).any():
-                    self._stop_joints(part.start + np.flatnonzero(beyond > 0.0), begin)
-                begin += 1
-        steps.run(begin, end)
+            self._stop_joints(part.start + np.flatnonzero(beyond > 0.0), stopped[0])
+            begin = stopped[0] + 1
 
     def _stop_joints(self, rows: NDArray[np.intp], call: int) -> None:
         """Evaluate a step of the robot again with stops, in lanes in which a joint passes one."""

@@ -13,7 +13,9 @@ from types import MappingProxyType
 from typing import Any
 
 from dynx.argument_types import checks_types
+from dynx.envs.ground_task import KERNEL_ENGINE
 from dynx.envs.registration import bare_name
+from dynx.training.specification import TaskSpec
 
 NO_VALUES: Mapping[str, Any] = MappingProxyType({})
 
@@ -77,8 +79,34 @@ PUBLISHED: Mapping[str, Mapping[str, Recipe]] = {"ppo": PPO}
 """Recipes by algorithm and task."""
 
 
+ON_FEET: Mapping[str, Mapping[str, Recipe]] = {
+    "ppo": {
+        "Walk": _recipe(
+            1024,
+            16_000_000,
+            normalize=True,
+            n_steps=24,
+            batch_size=6144,
+            n_epochs=5,
+            learning_rate="kl_0.01",
+            policy_kwargs={"net_arch": [128, 64], "activation_fn": "relu", "log_std_init": -1.2},
+        )
+    }
+}
+"""Recipes of dynx by algorithm and task, for a thousand environments in kernels with contacts: engine
+``dynx``, option ``contacts="feet"``. Rollouts, epochs and learning rate: Rudin and others, Learning to walk
+in minutes using massively parallel deep reinforcement learning (2022)."""
+
+
 @checks_types
-def recipe_of(algorithm: str, task: str) -> Recipe:
+def recipe_of(algorithm: str, task: str | TaskSpec) -> Recipe:
     """Return the published hyperparameters for a task such as ``dynx/CartPole-v0``, or the defaults if there
-    are none."""
-    return PUBLISHED.get(algorithm, {}).get(bare_name(task), Recipe())
+    are none.
+
+    A `TaskSpec` may have others on its engine than the name alone: those of `ON_FEET`.
+    """
+    name = bare_name(task if isinstance(task, str) else task.id)
+    published = PUBLISHED.get(algorithm, {}).get(name, Recipe())
+    if isinstance(task, str) or task.engine != KERNEL_ENGINE or task.options.get("contacts") != "feet":
+        return published
+    return ON_FEET.get(algorithm, {}).get(name, published)

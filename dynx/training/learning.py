@@ -59,8 +59,9 @@ class Schedule:
 
     The fields are the number of steps between checkpoints and between evaluations (None:
     `CHECKPOINTS_PER_RUN` checkpoints and `EVALUATIONS_PER_RUN` evaluations in the whole run), episodes of an
-    evaluation, threads of PyTorch, and whether curves are written for TensorBoard. The first evaluation with
-    a mean return of at least `target_return` ends the training; with None no evaluation ends it.
+    evaluation, threads (of environments with contacts in kernels, of mini-batches of PPO with more than 4096
+    samples, and of PyTorch), and whether curves are written for TensorBoard. The first evaluation with a mean
+    return of at least `target_return` ends the training; with None no evaluation ends it.
     """
 
     checkpoint_every: int | None = None

@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from dynx.envs.library import spaces
 from dynx.errors import ArgumentError, UnknownNameError, importing, nearest, shown
 from dynx.training.networks import CLIPPED_AT, EPSILON, check_archive
-from dynx.training.schedules import SCHEDULED, schedule_of
+from dynx.training.ppo import ThreadedPPO
+from dynx.training.schedules import SCHEDULED, SteadyDivergence, schedule_of
 
 with importing("training needs stable-baselines3: pip install 'dynx[train]'"):
     import torch
-    from stable_baselines3 import A2C, DQN, PPO, SAC, TD3
+    from stable_baselines3 import A2C, DQN, SAC, TD3
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.logger import configure
     from stable_baselines3.common.monitor import Monitor
@@ -53,7 +54,7 @@ __all__ = [
     "write_weights",
 ]
 
-ALGORITHMS: dict[str, type[Any]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC, "td3": TD3}
+ALGORITHMS: dict[str, type[Any]] = {"ppo": ThreadedPPO, "a2c": A2C, "dqn": DQN, "sac": SAC, "td3": TD3}
 """Algorithms by the name that `dynx train --algo` takes."""
 
 ACTIVATIONS = {
@@ -143,6 +144,8 @@ def new_algorithm(
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
             raise ArgumentError(f"{each} is {value!r}; wanted a number between 0 and 1")
     values = {each: schedule_of(each, value) for each, value in hyperparameters.items()}
+    if name != "ppo" and isinstance(values.get("learning_rate"), SteadyDivergence):
+        raise ArgumentError(f"learning_rate is {hyperparameters['learning_rate']}, which ppo alone has")
     if "policy_kwargs" in values:
         values["policy_kwargs"] = _policy_options(values["policy_kwargs"])
         _check_weights(values["policy_kwargs"], env, most_weights)

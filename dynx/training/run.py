@@ -23,6 +23,7 @@ from dynx.training.file_tasks import of_earlier_version
 from dynx.training.learning import BEST, CURVE, EVALUATIONS, FINAL, TENSORBOARD, Learning, Progress, Schedule
 from dynx.training.library import new_algorithm, set_threads
 from dynx.training.policy import Policy
+from dynx.training.ppo import ThreadedPPO
 from dynx.training.specification import TrainingSpec, read_spec, spec_document
 from dynx.training.vectors import make_training_vector
 
@@ -76,7 +77,7 @@ def train(
     spec = of_earlier_version(spec, schema)
     with ExitStack() as stack:
         stack.callback(set_threads(schedule.threads))
-        vector = make_training_vector(spec)
+        vector = make_training_vector(spec, schedule.threads)
         stack.callback(vector.close)
         judged = [
             stack.enter_context(closing(make(spec.task)))
@@ -87,6 +88,8 @@ def train(
         done = 0 if found is None else found.steps_done
         # Another seed after a checkpoint, or the same episodes would be learned again.
         algorithm = new_algorithm(spec.algorithm, vector, spec.hyperparameters, spec.seed + done)
+        if isinstance(algorithm, ThreadedPPO):
+            algorithm.threads = schedule.threads
         if found is not None:
             found.restore(algorithm, vector)
         _write_run(place, given, schema)

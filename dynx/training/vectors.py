@@ -33,29 +33,29 @@ MAX_ENVIRONMENTS = 10**6
 
 
 @checks_types
-def make_vector(task: TaskSpec, envs: int, *, processes: bool = False) -> VecEnv:
+def make_vector(task: TaskSpec, envs: int, *, processes: bool = False, threads: int = 1) -> VecEnv:
     """Make `envs` environments of a task for an algorithm of stable-baselines3, ``PPO("MlpPolicy", vector)``.
 
     On engine ``compiled``, and on ``dynx`` where its kernels have all that the task needs, all step in
-    compiled kernels, else one by one, or each in a process of its own with `processes`. The return and length
-    of each episode are in ``info["episode"]``. Raises ArgumentError for a task that Gymnasium cannot make,
-    and the errors of the task itself.
+    compiled kernels (those with contacts on at most `threads` threads), else one by one, or each in a process
+    of its own with `processes`. The return and length of each episode are in ``info["episode"]``. Raises
+    ArgumentError for a task that Gymnasium cannot make, and the errors of the task itself.
     """
     count = whole_number("envs", envs, 1, MAX_ENVIRONMENTS)
     if processes:
         return VecMonitor(SubprocVecEnv([partial(_monitored, task) for _ in range(count)]))
     if _steps_in_a_kernel(task):
         try:
-            return VecMonitor(BatchedEnvironments(_make_batched(task, count)))
+            return VecMonitor(BatchedEnvironments(_make_batched(task, count, threads)))
         except UnsupportedFeatureError:
             if task.engine != KERNEL_ENGINE:
                 raise
     return DummyVecEnv([partial(_monitored, task) for _ in range(count)])
 
 
-def make_training_vector(spec: TrainingSpec) -> VecEnv:
+def make_training_vector(spec: TrainingSpec, threads: int = 1) -> VecEnv:
     """Make the environments of a run; with `normalize` they are wrapped in a `VecNormalize`."""
-    vector = make_vector(spec.task, spec.envs, processes=spec.processes)
+    vector = make_vector(spec.task, spec.envs, processes=spec.processes, threads=threads)
     if not spec.normalize:
         return vector
     gamma = float(spec.hyperparameters.get("gamma", 0.99))
@@ -66,14 +66,14 @@ def _steps_in_a_kernel(task: TaskSpec) -> bool:
     return is_of_dynx(task.id) and task.engine == kernel_engine(task_class(task.id))
 
 
-def _make_batched(task: TaskSpec, count: int) -> Any:
+def _make_batched(task: TaskSpec, count: int, threads: int) -> Any:
     try:
         return make_vec_env(
             task.id,
             num_envs=count,
             vectorization_mode="vector_entry_point",
             autoreset_mode=AutoresetMode.SAME_STEP,
-            **task.arguments(),
+            **{"threads": threads, **task.arguments()},
         )
     except DynxError:
         raise
@@ -141,7 +141,9 @@ class BatchedEnvironments(VecEnv):  # type: ignore[misc]  # stable-baselines3 is
         observations, rewards, terminated, truncated, info = self._vector.step(self._actions)
         done = np.logical_or(terminated, truncated)
         begun = {name: value for name, value in info.items() if not name.lstrip("_").startswith("final_")}
-        infos = [{} if done[k] else _info_of(begun, k) for k in range(self.num_envs)]
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for k in np.flatnonzero(_told(begun, self.num_envs) & ~done).tolist():
+            infos[k] = _info_of(begun, k)
         for k in np.flatnonzero(done).tolist():
             infos[k] = {
                 **_info_of(info["final_info"], k),
@@ -211,6 +213,14 @@ _ROWS = ("states", "parameters")
 """Attributes of environments in a kernel with a row for each."""
 
 _OF_ONE = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
+
+
+def _told(info: Mapping[str, Any], count: int) -> NDArray[np.bool_]:
+    """Return which environments (count,) have an entry in an info."""
+    found = np.zeros(count, dtype=np.bool_)
+    for name in info:
+        found |= info.get(f"_{name}", False)
+    return found
 
 
 def _info_of(info: Mapping[str, Any], k: int) -> dict[str, Any]:

@@ -162,8 +162,9 @@ def distance() -> None:
         type=name_value,
         multiple=True,
         metavar="NAME=VALUE",
-        help="Hyperparameter of the algorithm, such as gamma=0.98 or learning_rate=lin_0.001 (falls to zero "
-        "until the end); may be given several times (default: those of rl-baselines3-zoo).",
+        help="Hyperparameter of the algorithm, such as gamma=0.98, learning_rate=lin_0.001 (falls to zero "
+        "until the end) or learning_rate=kl_0.01 (PPO: keeps the divergence of updates near 0.01); may be "
+        "given several times (default: those of rl-baselines3-zoo).",
     ),
 )
 @group(
@@ -209,7 +210,8 @@ def distance() -> None:
         type=click.IntRange(min=1),
         default=1,
         show_default=True,
-        help="Threads of PyTorch; small networks are no faster with more.",
+        help="Threads of environments with contacts in kernels, of mini-batches of PPO with more than 4096 "
+        "samples, and of PyTorch, which is no faster with more for small networks.",
     ),
     click.option("--tensorboard", is_flag=True, help="Write curves for TensorBoard into the folder."),
 )

@@ -192,7 +192,7 @@ def _specification(
             {**earlier.hyperparameters, **given},
         )
     algorithm = algorithm or ALGORITHM
-    recipe = recipe_of(algorithm, task.id)
+    recipe = recipe_of(algorithm, task)
     return TrainingSpec(
         task,
         algorithm,
