@@ -217,7 +217,8 @@ def _read_network(file: BinaryIO, spec: TrainingSpec, env: Env[Any, Any], source
 
 def _read_algorithm(file: BinaryIO, spec: TrainingSpec, env: Env[Any, Any], source: str) -> Any:
     """Return the algorithm of stable-baselines3 with the weights of a file."""
-    from dynx.training.library import DummyVecEnv, new_algorithm, read_weights, weights_of_file
+    from dynx.training.algorithms import new_algorithm
+    from dynx.training.library import DummyVecEnv, read_weights, weights_of_file
 
     with warnings.catch_warnings():
         # Warnings about the number of environments concern training.

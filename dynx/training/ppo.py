@@ -14,14 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.errors import importing
 from dynx.simd.threads import run_parts
+from dynx.training.library import PPO, explained_variance, torch
 from dynx.training.schedules import SteadyDivergence
-
-with importing("training needs stable-baselines3: pip install 'dynx[train]'"):
-    import torch
-    from stable_baselines3 import PPO
-    from stable_baselines3.common.utils import explained_variance
 
 PART = 4096
 """Largest number of samples of a part of a mini-batch."""

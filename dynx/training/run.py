@@ -16,12 +16,13 @@ from dynx.files.links import refuse_links
 from dynx.files.reading import checked_path, read_file
 from dynx.files.writing import write_text
 from dynx.model.numbers import whole_number
+from dynx.training.algorithms import new_algorithm
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.environments import make
 from dynx.training.evaluation import AT_ONCE, MAX_EPISODES, Evaluation
 from dynx.training.file_tasks import of_earlier_version
 from dynx.training.learning import BEST, CURVE, EVALUATIONS, FINAL, TENSORBOARD, Learning, Progress, Schedule
-from dynx.training.library import new_algorithm, set_threads
+from dynx.training.library import set_threads
 from dynx.training.policy import Policy
 from dynx.training.ppo import ThreadedPPO
 from dynx.training.specification import TrainingSpec, read_spec, spec_document

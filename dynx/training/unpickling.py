@@ -21,14 +21,11 @@ import numpy as np
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.files.reading import named_file
+from dynx.training.algorithms import ACTIVATIONS, ALGORITHMS, hyperparameters_of, new_algorithm
 from dynx.training.environments import make
 from dynx.training.library import (
-    ACTIVATIONS,
-    ALGORITHMS,
     DummyVecEnv,
     VecNormalize,
-    hyperparameters_of,
-    new_algorithm,
 )
 from dynx.training.networks import CLIPPED_AT, EPSILON
 from dynx.training.policy import DOCUMENT, Policy, Scaling

@@ -17,7 +17,7 @@ from stable_baselines3 import PPO
 
 from dynx.errors import ArgumentError
 from dynx.training import Schedule, TaskSpec, load_policy, make, train
-from dynx.training.library import ALGORITHMS
+from dynx.training.algorithms import ALGORITHMS
 from dynx.training.policy import DOCUMENT, read_policy_document
 from tests.training.runs import members, small_run, written
 

@@ -15,8 +15,8 @@ from stable_baselines3 import PPO
 from dynx.errors import ArgumentError
 from dynx.training import Schedule, TaskSpec, make_vector, train
 from dynx.training import ppo as module
+from dynx.training.algorithms import new_algorithm
 from dynx.training.checkpoints import Checkpoints
-from dynx.training.library import new_algorithm
 from dynx.training.ppo import ThreadedPPO
 from dynx.training.schedules import MAX_RATE, MIN_RATE, START_RATE, SteadyDivergence, schedule_of
 from tests.training.runs import small_run

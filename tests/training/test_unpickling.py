@@ -20,7 +20,7 @@ import dynx.envs  # noqa: F401  (registers the tasks)
 from dynx.cli.shell.main import cli
 from dynx.errors import ArgumentError
 from dynx.training import TaskSpec, judge, load_policy, load_stable_baselines
-from dynx.training.library import ALGORITHMS
+from dynx.training.algorithms import ALGORITHMS
 
 OFF: dict[str, Any] = {"learning_starts": 8, "buffer_size": 100, "batch_size": 4}
 CASES: dict[str, tuple[str, str, dict[str, Any]]] = {
