@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.backends.solvability import Solvability
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.step import StepText
 from dynx.errors import ArgumentError, UnsupportedFeatureError
@@ -57,10 +58,12 @@ def contact_step_text(
     is target (n joints,), another output residual (1,). Damping, dry friction, armature and springs of the
     joints are in the step.
 
-    Raises UnsupportedFeatureError for a robot with mimic joints or ball joints.
+    Raises UnsupportedFeatureError for a robot with mimic joints or ball joints, SingularMassMatrixError for
+    one without the mass to move.
     """
     refuse_other_joints(model)
     dynamics = [joint.dynamics for joint in model.coordinate_joints]
+    Solvability(model).refuse_singular(joint_dynamics=any(each.armature for each in dynamics))
     n = len(dynamics)
     mechanism = simplify_mechanism(model.mechanism)
     regrouped = regroup_inertias(mechanism)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.backends.solvability import Solvability
 from dynx.compiled.contact_step import refuse_other_joints, shapes_on_plane
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.step import StepText, compiled
@@ -158,7 +159,8 @@ class GroundContacts:
     def of(cls, task: GroundTask, joints: JointOptions = DESCRIBED) -> GroundContacts:
         """Read the scene of a task.
 
-        Raises UnsupportedFeatureError, naming the part, for what a kernel does not have.
+        Raises UnsupportedFeatureError, naming the part, for what a kernel does not have, and
+        SingularMassMatrixError, naming the joints, for a robot without the mass to move.
         """
         task.refuse_other_hooks()
         name, scene = type(task).__name__, task.scene()
@@ -170,8 +172,10 @@ class GroundContacts:
             if not body.fixed:
                 raise UnsupportedFeatureError(f"{body.name} moves; a kernel has one robot that moves")
         touching = shapes_on_plane(layout)
-        model = layout.robots[0].model
+        robot = layout.robots[0]
+        model = robot.model
         refuse_other_joints(model)
+        Solvability(model).refuse_singular(joint_dynamics=bool(robot.armature.any()))
         points = sum(touching.counts)
         if points > MAX_POINTS:
             raise UnsupportedFeatureError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,10 @@ from hypothesis import strategies as st
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.envs.tasks.walk import Walk
 from dynx.envs.vector import RobotVectorEnvironment
-from dynx.errors import ArgumentError, NotFiniteError
+from dynx.errors import ArgumentError, NotFiniteError, SingularMassMatrixError
 from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.spatial.scalar import Floats
+from dynx.world import Scene
 
 COUNT = 9
 
@@ -150,3 +152,22 @@ def test_a_state_that_is_not_finite_is_named_and_changes_nothing(
 def test_masses_of_zero_are_refused_by_name(scale: Any) -> None:
     with pytest.raises(ArgumentError, match="mass_scale"):
         RobotVectorEnvironment(Walk(contacts="feet"), 2, randomize={"mass_scale": {"trunk": scale}})
+
+
+def test_a_robot_without_mass_is_refused_by_name() -> None:
+    walk = Walk(contacts="feet")
+    dog = walk.model
+    links = [replace(each, inertial=None) for each in dog.links]
+    light = type(dog).build("light", links, dog.joints, base="floating", geometry=dog.geometry)
+
+    class Light(Walk):
+        """A walk of a robot without mass."""
+
+        def scene(self) -> Scene:
+            scene = super().scene()
+            return replace(scene, robots=tuple(replace(each, model=light) for each in scene.robots))
+
+    with pytest.raises(
+        SingularMassMatrixError, match="light has no unique acceleration: nothing that 'base'"
+    ):
+        RobotVectorEnvironment(Light(contacts="feet"), 2)
