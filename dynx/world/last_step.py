@@ -161,7 +161,7 @@ class LastStep:
         robots = range(len(self._models))
         step = StepRecord(
             self._begun,
-            self._forces,
+            self._acting(engine),
             after,
             contacts,
             [engine.damps_at_end(k) for k in robots],
@@ -171,6 +171,14 @@ class LastStep:
             [self._contact_forces(k, contacts) for k in robots],
         )
         return reactions(self._layout, self._in_engine, step)
+
+    def _acting(self, engine: Stepper) -> Forces:
+        """Return what acted in the step, with the torques of the motors for which the engine solved."""
+        torques = list(self._forces.torques)
+        for k in self._forces.motors:
+            own = engine.motor_torque(k)
+            torques += [] if own is None else [(k, own)]
+        return self._forces._replace(torques=torques)
 
     @cached_property
     def _engines(self) -> list[Backend]:
