@@ -163,6 +163,9 @@ def _origin(i: int, turn: bool) -> Plant:
         names = {joint.name, f"{joint.child}_fixed", joint.child}
         if any(robot.is_implied(each) for each in (joint.parent, joint.child)):
             names |= {name for each in robot.chain(joint) for name in (each.name, each.child)}
+        above = robot.above(joint.parent)
+        if above is not None and robot.is_implied(joint.parent):
+            names.add(f"{above.name}_fixed")  # its name from SDF, where the joint has a place in the link
         only_frame = all(robot.links[each].is_empty for each in robot.below(joint))
         if only_frame and fixed and not any(robot.above(each).moves for each in robot.below(joint)):  # type: ignore[union-attr]
             return Planted("attribute frame", names | robot.below(joint))
@@ -192,9 +195,20 @@ def _type(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
     return Planted("type", {joint.name, joint.child, f"{joint.child}_fixed"})
 
 
+NO_LIMIT = 1e16
+"""Number from which on a limit limits nothing, as SDF has it."""
+
+
 def _limit(name: str, kind: str) -> Plant:
     def change(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
-        joint = _pick(rng, [each for each in robot.joints if each.moves and getattr(each, name)])
+        joint = _pick(
+            rng,
+            [
+                each
+                for each in robot.joints
+                if each.moves and 0.0 < abs(getattr(each, name) or 0.0) < NO_LIMIT
+            ],
+        )
         value = getattr(joint, name)
         outwards = -1.0 if name == "lower" else 1.0
         setattr(joint, name, value + outwards * size * abs(value))
@@ -336,6 +350,9 @@ def _contact_pair(robot: Robot, rng: np.random.Generator, size: float) -> Plante
         above, below = robot.links[joint.parent], robot.links[joint.child]
         first = [each for each in above.shapes if not each.visual]
         second = [each for each in below.shapes if not each.visual]
+        known = [{id(one), id(two)} for one, two in robot.contacts]
+        if first and second and {id(first[0]), id(second[0])} in known:
+            continue
         if joint.type != "fixed" and first and second and not robot.is_static(joint.parent):
             found.append((joint, first[0], second[0]))
     joint, *shapes = _pick(rng, found)

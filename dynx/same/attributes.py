@@ -18,10 +18,9 @@ from dynx.model.xml.several_files import file_of_line
 from dynx.same.decimals import rounded
 from dynx.same.fit import BodyFit, Fit, angle_of
 from dynx.same.limits import differs, limit_pairs
-from dynx.same.matching import is_of_reader
 from dynx.same.scales import inertia_ratio
 from dynx.same.shapes import NEGLIGIBLE, SHAPE_KINDS, MatchedShapes, ShapeKind, ShapeOfBody, matched_shapes
-from dynx.same.skeleton import float_inertia, subtract, transformed
+from dynx.same.skeleton import float_inertia, is_of_reader, subtract, transformed
 from dynx.same.text import pose_text, vector_text
 from dynx.spatial.se3 import homogeneous, inverse
 

@@ -276,6 +276,9 @@ def compensation_differences(ours: Model, theirs: Model, found: Fit, tolerance: 
         mine, other = (_compensated(model, found, each, k) for k, model in enumerate((ours, theirs)))
         if mine is None or other is None:
             continue
+        if None not in (mine.factor, other.factor) and mine.factor == other.factor:
+            # Where the masses differ, that is the difference.
+            continue
         relative = mine.moment / mine.mass, other.moment / other.mass
         size = max(1.0, float(np.abs(relative[0]).max()), float(np.abs(relative[1]).max()))
         limit = tolerance * size * reach

@@ -19,11 +19,19 @@ from dynx.model.mechanism import ROOT, pose_arrays
 from dynx.model.topology import resolve_mimics
 from dynx.same.decimals import decimals, fifty_digits, rounded
 from dynx.same.fit import BodyFit, Fit, angle_of, drive, fit
-from dynx.same.matching import UNCHANGED, BodyPair, Matching, MatchingPlan, is_of_reader
+from dynx.same.matching import UNCHANGED, BodyPair, Matching, MatchingPlan
 from dynx.same.observability import observability_of
 from dynx.same.registration import principal_frames
 from dynx.same.scales import inertia_ratio
-from dynx.same.skeleton import Skeleton, are_alike, float_inertia, kind_of, subtract, transformed
+from dynx.same.skeleton import (
+    Skeleton,
+    are_alike,
+    float_inertia,
+    is_of_reader,
+    kind_of,
+    subtract,
+    transformed,
+)
 from dynx.same.text import inertial_text, pose_text, vector_text
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats

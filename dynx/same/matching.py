@@ -16,14 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from dynx.model import Model
-from dynx.model.elements import Joint
 from dynx.model.mechanism import ROOT
 from dynx.same.limits import limit_differences
 from dynx.same.registration import candidates, candidates_of_other_pairings
 from dynx.same.scales import extent, inertia_ratio
 from dynx.same.shapes import SHAPE_KINDS, matched_shapes
-from dynx.same.skeleton import Skeleton, are_alike, subtract, transformed
+from dynx.same.skeleton import Skeleton, are_alike, is_of_reader, subtract, transformed
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 from dynx.spatial.so3 import cross, rotation_about
@@ -448,10 +446,11 @@ class Matching:
     def _matched_names(self, a: int, b: int) -> tuple[list[tuple[int, int]], list[int], list[int]]:
         matched: list[tuple[int, int]] = []
         left, right = list(self.ours.children[a]), list(self.theirs.children[b])
-        for attribute in ("name", "child"):
-            names = {getattr(self.theirs.joints[j], attribute): j for j in right}
+        joints = [joint.name for joint in self.ours.joints], [joint.name for joint in self.theirs.joints]
+        for ours, theirs in (joints, (self.ours.named_links, self.theirs.named_links)):
+            names = {theirs[j]: j for j in right}
             for i in list(left):
-                j = names.get(getattr(self.ours.joints[i], attribute))
+                j = names.get(ours[i])
                 if j is not None and self._alike(i, j):
                     matched.append((i, j))
                     left.remove(i)
@@ -712,12 +711,3 @@ def attachments(skeleton: Skeleton, body: int) -> int:
     if not heavy and len(joints) == 1 and not joints[0].moves:
         return 0
     return 0 if is_of_reader(skeleton.model, joint) else heavy + len(joints)
-
-
-def is_of_reader(model: Model, joint: Joint) -> bool:
-    """Check whether a reader makes the child link of a joint, without mass: for a joint beside the origin of
-    its body, or before another joint of the body."""
-    inertial = model.inertial(joint.child)
-    made = joint.moves and joint.line is not None and model.link(joint.child).line == joint.line
-    held = sum(each.parent == joint.child for each in model.joints)
-    return made and held == 1 and not (inertial.mass or inertial.tensor.any())

@@ -95,6 +95,15 @@ def _numbers_of(inertial: Inertial) -> tuple[Floats, Floats, Floats]:
     return np.array([inertial.mass]), T[:3, 3], R @ inertial.tensor @ R.T
 
 
+def is_of_reader(model: Model, joint: Joint) -> bool:
+    """Check whether a reader makes the child link of a joint, without mass: for a joint beside the origin of
+    its body, or before another joint of the body."""
+    inertial = model.inertial(joint.child)
+    made = joint.moves and joint.line is not None and model.link(joint.child).line == joint.line
+    held = sum(each.parent == joint.child for each in model.joints)
+    return made and held == 1 and not (inertial.mass or inertial.tensor.any())
+
+
 class Skeleton:
     """Bodies of a model, one for each joint that moves, in the order of its mechanism; ROOT is the root body.
 
@@ -145,6 +154,18 @@ class Skeleton:
     def inertias(self) -> dict[int, RigidInertia]:
         """Merged inertias in float64."""
         return {body: float_inertia(self.inertia(body)) for body in self.children}
+
+    @cached_property
+    def named_links(self) -> list[str]:
+        """Name of the child link of each body's joint, or of the body that the joint is part of in the file
+        if a reader made that link."""
+        below = {joint.parent: joint for joint in self.model.joints}
+        found = []
+        for joint in self.joints:
+            while is_of_reader(self.model, joint):
+                joint = below[joint.child]
+            found.append(joint.child)
+        return found
 
     @cached_property
     def heavy_links(self) -> dict[int, dict[str, RigidInertia]]:

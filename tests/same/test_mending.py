@@ -376,6 +376,23 @@ def test_a_joint_beside_its_body_in_one_file_alone_is_no_difference() -> None:
         assert {(each.kind, each.tag) for each in report.attributes} == {("name", "joint")}
 
 
+def test_joints_on_one_line_are_matched_by_the_bodies_of_the_file() -> None:
+    """Two like hinges on one axis have other names; in one file the joints lie beside their bodies."""
+    leg = (
+        '<body name="{0}" pos="{1} 0 0"><inertial pos="{2} 0.1 -0.1" mass="1" diaginertia="0.1 0.2 0.25"/>'
+        '<joint name="{3}" axis="1 0 0"/></body>'
+    )
+    base = '<body name="base"><freejoint/><inertial pos="0 0 0.05" mass="5" diaginertia="1 2 2.5"/>'
+    text = f"<mujoco><worldbody>{base}{{}}{{}}</body></worldbody></mujoco>"
+    first = text.format(leg.format("front", 0.2, 0.1, "a"), leg.format("rear", -0.2, -0.1, "b"))
+    beside = leg.replace('pos="{1} 0 0"', 'pos="{1} 0.3 0"').replace("0.1 -0.1", "-0.2 -0.1")
+    beside = beside.replace('axis="1 0 0"', 'pos="0 -0.3 0" axis="1 0 0"')
+    second = text.format(beside.format("rear", -0.2, -0.1, "j_b"), beside.format("front", 0.2, 0.1, "j_a"))
+    report = same_robot(first, second)
+    assert report.same, (report.differences, report.unmatched)
+    assert {(each.ours, each.theirs) for each in report.coordinates} == {("a", "j_a"), ("b", "j_b")}
+
+
 def test_a_body_and_a_joint_in_frames_are_mended_in_the_frames() -> None:
     framed = BODIES.replace('<body name="lower"', '<frame pos="0.1 0 0" euler="0 0 0.5"><body name="lower"')
     framed = framed.replace("</body>\n    </body>", "</body></frame>\n    </body>")
