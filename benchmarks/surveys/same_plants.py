@@ -681,8 +681,11 @@ def _parent(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
 def _joint_name(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
     joint = _pick(rng, [each for each in robot.joints if each.moves])
     old = joint.name
+    # A link that MJCF implies is called for its joint, and has that name in URDF and SDF.
+    links = {joint.child} if robot.is_implied(joint.child) else set()
     rename_joints(robot, {old: "renamed_joint"})
-    return Planted("attribute name", {old, joint.name})
+    links |= {joint.child} if links else set()
+    return Planted("attribute name", {old, joint.name} | links)
 
 
 @plant("link name")

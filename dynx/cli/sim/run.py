@@ -26,10 +26,8 @@ from dynx.cli.sim.request import SimulationRequest, limit_message, prepare
 from dynx.cli.sim.tutorial import run_tutorial
 from dynx.errors import ArgumentError, DynxError, LimitError, NotInstalledError, SimulationError, shown
 from dynx.files.figures import picture_format
-from dynx.model import Model
 from dynx.sim import Rollout, RolloutInterrupted, simulate
 from dynx.sim.record.formats import WRITERS
-from dynx.sim.record.mcap_file import refuse_unwritable
 
 
 @dataclass(frozen=True)
@@ -57,11 +55,6 @@ class Outputs:
                 raise ArgumentError(f"{shown(path, 300)} would be written twice")
         if self.plot is not None:
             picture_format(self.plot)
-
-    def check_robot(self, model: Model) -> None:
-        """Raise UnsupportedFeatureError for a robot that the format of a file cannot have."""
-        if any(path.lower().endswith(".mcap") for path in self.save):
-            refuse_unwritable(model)
 
     def write(self, rollout: Rollout) -> dict[str, DynxError]:
         """Write all files; return the errors of those that cannot be written, by path."""
@@ -106,7 +99,6 @@ def sim(robot: str | None, tutorial: bool, json_path: str | None, **given: Any) 
         raise click.UsageError("ROBOT is missing; only --tutorial has a default", context)
     outputs.check()
     request = prepare({"robot": robot, **given})
-    outputs.check_robot(request.scenario.model)
     return run_sim(request, outputs, json_path=json_path)
 
 

@@ -22,10 +22,15 @@ from dynx.errors import ArgumentError, DynxError, importing, shown
 from dynx.files.documents import parse_json
 from dynx.files.reading import MAX_BINARY_BYTES, checked_path, open_regular, printable, require_size
 from dynx.model import Model
-from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.documents import pose_numbers, robot_from_document
 from dynx.sim.record.rollout import Rollout
-from dynx.sim.record.ros_messages import MessageReader, schema_name, schema_text, topics_of
+from dynx.sim.record.ros_messages import (
+    JointColumns,
+    MessageReader,
+    schema_name,
+    schema_text,
+    topics_of,
+)
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
@@ -45,16 +50,8 @@ ABOUT_CHANNEL = {"offered_qos_profiles": ""}
 """Entry that the ROS 2 profile of MCAP requires; an empty one leaves the quality of service to the player."""
 
 
-def refuse_unwritable(model: Model) -> None:
-    """Raise UnsupportedFeatureError for a robot that a recording cannot have: its messages have one position
-    and one velocity for each joint."""
-    refuse_ball_joints(model, "a .mcap file", "files in .npz and .csv do")
-
-
 def write_mcap(rollout: Rollout, file: BinaryIO) -> None:
-    """Write `rollout` as a recording. Raises NotInstalledError without mcap (extra ``mcap``), and
-    UnsupportedFeatureError for a robot with ball joints."""
-    refuse_unwritable(rollout.model)
+    """Write `rollout` as a recording. Raises NotInstalledError without mcap (extra ``mcap``)."""
     with importing("a .mcap file needs mcap: pip install 'dynx[mcap]'"):
         from mcap.writer import Writer
     writer = Writer(file)
@@ -161,6 +158,7 @@ def _metadata(rollout: Rollout) -> dict[str, str]:
         "base_pose": pose_numbers(model.base_pose),
         "gravity": list(model.gravity),
         "rotors": rollout.rotors.tolist(),
+        **({"ball_joints": [joint.name for joint in model.ball_joints]} if model.ball_joints else {}),
         **rollout.settings,
     }
     return {name: value if isinstance(value, str) else json.dumps(value) for name, value in known.items()}
@@ -205,21 +203,26 @@ def _fields(messages: Messages, settings: dict[str, str]) -> dict[str, Any]:
             "base": settings["base"],
             "gravity": known["gravity"],
             "base_pose": known["base_pose"],
+            "ball_joints": parse_json(settings.get("ball_joints", "[]")),
         }
     )
     states = messages["/joint_states"]
     n = len(states) - 1
-    q, v = _states(model, messages, "/joint_states", "/base/odometry", n + 1)
-    a, tau = np.zeros((n, model.nv)), np.zeros((n, model.nv))
+    q, v = _states(model, messages, "/joint_states", "/ball_joints", "/base/odometry", n + 1)
+    columns = JointColumns.of(model)
+    tau = np.zeros((n, model.nv))
     saturated = np.zeros((n, model.nv), dtype=bool)
-    base = 6 if model.floating else 0
+    a = _accelerations_of(model, messages, "/accelerations", "/ball_joints/accelerations", n)
     for k in range(n):
-        tau[k, base:] = _joint_state(states[k][1])[2]
-        a[k, base:] = _acceleration(messages["/accelerations"][k][1])
-        saturated[k, base:] = _joint_state(messages["/saturated"][k][1])[2] > 0.5
-        if base:
-            a[k, :base] = _vectors(messages["/base/acceleration"][k][1])
-            tau[k, :base] = _vectors(messages["/base/wrench"][k][1])
+        tau[k, columns.in_v] = _joint_state(states[k][1])[2]
+        saturated[k, columns.in_v] = _joint_state(messages["/saturated"][k][1])[2] > 0.5
+        if columns.balls:
+            tau[k, columns.balls_in_v] = _ball_state(messages["/ball_joints"][k][1])[2]
+            flags = _ball_state(messages["/ball_joints/saturated"][k][1])[2]
+            saturated[k, columns.balls_in_v] = flags > 0.5
+        if model.floating:
+            a[k, :6] = _vectors(messages["/base/acceleration"][k][1])
+            tau[k, :6] = _vectors(messages["/base/wrench"][k][1])
     return {
         "model": model,
         "t": np.array([stamp for stamp, _ in states]) * 1e-9,
@@ -236,25 +239,37 @@ def _fields(messages: Messages, settings: dict[str, str]) -> dict[str, Any]:
 def _reference(model: Model, messages: Messages, n: int) -> Setpoint | None:
     if "/reference" not in messages:
         return None
-    q, v = _states(model, messages, "/reference", "/base/reference", n)
-    base = 6 if model.floating else 0
-    a = np.zeros((n, model.nv))
-    for k in range(n):
-        a[k, base:] = _acceleration(messages["/reference_accelerations"][k][1])
-        if base:
-            a[k, :base] = _vectors(messages["/base/reference_acceleration"][k][1])
+    q, v = _states(model, messages, "/reference", "/ball_joints/reference", "/base/reference", n)
+    a = _accelerations_of(
+        model, messages, "/reference_accelerations", "/ball_joints/reference_accelerations", n
+    )
+    for k in range(n if model.floating else 0):
+        a[k, :6] = _vectors(messages["/base/reference_acceleration"][k][1])
     return Setpoint(q, v, a)
 
 
-def _states(model: Model, messages: Messages, joints: str, base: str, n: int) -> tuple[Floats, Floats]:
-    """Return configurations (n, nq) and velocities (n, nv) of two topics."""
+def _accelerations_of(model: Model, messages: Messages, joints: str, balls: str, n: int) -> Floats:
+    """Return the accelerations (n, nv) of the joints, of two topics."""
+    columns, a = JointColumns.of(model), np.zeros((n, model.nv))
+    for k in range(n):
+        a[k, columns.in_v] = _acceleration(messages[joints][k][1])
+        if columns.balls:
+            a[k, columns.balls_in_v] = _ball_acceleration(messages[balls][k][1])
+    return a
+
+
+def _states(
+    model: Model, messages: Messages, joints: str, balls: str, base: str, n: int
+) -> tuple[Floats, Floats]:
+    """Return configurations (n, nq) and velocities (n, nv) of three topics."""
+    columns = JointColumns.of(model)
     q, v = np.zeros((n, model.nq)), np.zeros((n, model.nv))
     for k in range(n):
-        position, velocity, _ = _joint_state(messages[joints][k][1])
+        q[k, columns.in_q], v[k, columns.in_v], _ = _joint_state(messages[joints][k][1])
+        if columns.balls:
+            q[k, columns.balls_in_q], v[k, columns.balls_in_v], _ = _ball_state(messages[balls][k][1])
         if model.floating:
-            pose, twist = _odometry(messages[base][k][1])
-            position, velocity = np.concatenate([pose, position]), np.concatenate([twist, velocity])
-        q[k], v[k] = position, velocity
+            q[k, :7], v[k, :6] = _odometry(messages[base][k][1])
     return q, v
 
 
@@ -269,6 +284,27 @@ def _joint_state(data: bytes) -> tuple[Floats, Floats, Floats]:
     message = _after_header(data)
     message.texts()
     return message.numbers(), message.numbers(), message.numbers()
+
+
+def _ball_state(data: bytes) -> tuple[Floats, Floats, Floats]:
+    """Return the quaternions, angular velocities and torques of a MultiDOFJointState, each in one array."""
+    message = _after_header(data)
+    message.texts()
+    return _structures(message, 7), _structures(message, 6), _structures(message, 6)
+
+
+def _ball_acceleration(data: bytes) -> Floats:
+    """Return the angular accelerations of the only point of a MultiDOFJointTrajectory, in one array."""
+    message = _after_header(data)
+    message.texts()
+    message.whole(), _structures(message, 7), _structures(message, 6)
+    return _structures(message, 6)
+
+
+def _structures(message: MessageReader, size: int) -> Floats:
+    """Return the numbers of a sequence of structures of `size` numbers, without the first three of each."""
+    count = message.whole()
+    return message.numbers(count * size).reshape(count, size)[:, 3:].ravel()
 
 
 def _acceleration(data: bytes) -> Floats:

@@ -11,6 +11,19 @@
 | `/error` | sensor_msgs/JointState | `position` is the tracking error: the reference minus the position |
 | `/robot_description` | std_msgs/String | the simulated robot as URDF, once, at the beginning |
 
+These have the joints with one coordinate. A ball joint has the topics below, in which translations, linear
+velocities and forces are 0, and all else but the attitude is in the axes of the child link. URDF has no ball
+joints: the description has a hinge in the place of each, and the metadata list their names.
+
+| topic | type | content |
+|---|---|---|
+| `/ball_joints` | sensor_msgs/MultiDOFJointState | attitudes, angular velocities and torques |
+| `/ball_joints/accelerations` | trajectory_msgs/MultiDOFJointTrajectory | accelerations; one element |
+| `/ball_joints/saturated` | sensor_msgs/MultiDOFJointState | `torque` is 1 at a limit, otherwise 0 |
+| `/ball_joints/reference` | sensor_msgs/MultiDOFJointState | reference attitudes and angular velocities |
+| `/ball_joints/reference_accelerations` | trajectory_msgs/MultiDOFJointTrajectory | those of the reference |
+| `/ball_joints/error` | sensor_msgs/MultiDOFJointState | `twist` has the rotation [rad] to the reference |
+
 A floating base adds these topics. Its pose is in the frame ``world`` (``map`` if the root link is called
 ``world``), all else in the axes of the root link:
 
@@ -63,6 +76,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.model import Model
+from dynx.model.documents import with_hinges_for_balls
 from dynx.sim.record.rollout import Rollout
 from dynx.spatial.scalar import Floats
 
@@ -98,6 +113,10 @@ DEFINITIONS = {
     "sensor_msgs/JointState": (
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n"
     ),
+    "sensor_msgs/MultiDOFJointState": (
+        "std_msgs/Header header\nstring[] joint_names\ngeometry_msgs/Transform[] transforms\n"
+        "geometry_msgs/Twist[] twist\ngeometry_msgs/Wrench[] wrench\n"
+    ),
     "std_msgs/Float64": "float64 data\n",
     "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
     "std_msgs/String": "string data\n",
@@ -108,6 +127,13 @@ DEFINITIONS = {
     "trajectory_msgs/JointTrajectoryPoint": (
         "float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] effort\n"
         "builtin_interfaces/Duration time_from_start\n"
+    ),
+    "trajectory_msgs/MultiDOFJointTrajectory": (
+        "std_msgs/Header header\nstring[] joint_names\nMultiDOFJointTrajectoryPoint[] points\n"
+    ),
+    "trajectory_msgs/MultiDOFJointTrajectoryPoint": (
+        "geometry_msgs/Transform[] transforms\ngeometry_msgs/Twist[] velocities\n"
+        "geometry_msgs/Twist[] accelerations\nbuiltin_interfaces/Duration time_from_start\n"
     ),
 }
 """Definition of each message by ``package/Name``; a field type of its own package is written without it. They
@@ -247,36 +273,88 @@ class Topic(NamedTuple):
 def topics_of(rollout: Rollout) -> list[Topic]:
     """Return all topics of `rollout`; one whose layout differs at the last state appears twice."""
     base = _base_topics(rollout) if rollout.model.floating else []
-    return [*_joint_topics(rollout), *base, *_contact_topics(rollout), *_sensor_topics(rollout)]
+    balls = _ball_topics(rollout) if rollout.model.ball_joints else []
+    return [*_joint_topics(rollout), *balls, *base, *_contact_topics(rollout), *_sensor_topics(rollout)]
+
+
+class JointColumns(NamedTuple):
+    """Names of the joints with one coordinate and their columns of q and v, then those of the ball joints:
+    four columns of q and three of v for each."""
+
+    names: list[str]
+    in_q: list[int]
+    in_v: list[int]
+    balls: list[str]
+    balls_in_q: list[int]
+    balls_in_v: list[int]
+
+    @classmethod
+    def of(cls, model: Model) -> JointColumns:
+        """Return the columns of a robot."""
+        balls = [joint.name for joint in model.ball_joints]
+        names = [name for name in model.joint_names if name not in balls]
+        return cls(
+            names,
+            [model.position_index(name) for name in names],
+            [model.coordinate_index(name) for name in names],
+            balls,
+            [model.position_index(name) + k for name in balls for k in range(4)],
+            [model.coordinate_index(name) + k for name in balls for k in range(3)],
+        )
 
 
 def _joint_topics(rollout: Rollout) -> list[Topic]:
-    model, n = rollout.model, len(rollout)
-    base_q, base_v = (7, 6) if model.floating else (0, 0)
-    names = model.joint_names
-    flags = rollout.saturated[:, base_v:].astype(np.float64)
-
-    def joints(q: Floats, v: Floats = NO_VALUES, effort: Floats = NO_VALUES) -> Fields:
-        return _joint_states(names, q[:, base_q:], v[:, base_v:], effort[:, base_v:])
+    n, columns = len(rollout), JointColumns.of(rollout.model)
+    names, in_q, in_v = columns.names, columns.in_q, columns.in_v
+    flags = rollout.saturated[:, in_v].astype(np.float64)
 
     def topic(name: str, kind: str, fields: Fields, first: int = 0, last: int = n + 1) -> Topic:
         return Topic(name, kind, first, last, fields)
 
     state, points = "sensor_msgs/JointState", "trajectory_msgs/JointTrajectory"
+    q, v, description = rollout.q[:, in_q], rollout.v[:, in_v], with_hinges_for_balls(rollout.model).to_urdf()
     topics = [
-        topic("/robot_description", "std_msgs/String", _text(model.to_urdf()), last=1),
-        topic("/joint_states", state, joints(rollout.q, rollout.v, rollout.tau), last=n),
-        topic("/joint_states", state, joints(rollout.q, rollout.v), first=n),
-        topic("/accelerations", points, _accelerations(names, rollout.a[:, base_v:]), last=n),
+        topic("/robot_description", "std_msgs/String", _text(description), last=1),
+        topic("/joint_states", state, _joint_states(names, q, v, rollout.tau[:, in_v]), last=n),
+        topic("/joint_states", state, _joint_states(names, q, v), first=n),
+        topic("/accelerations", points, _accelerations(names, rollout.a[:, in_v]), last=n),
         topic("/saturated", state, _joint_states(names, effort=flags), last=n),
         topic("/energy", "std_msgs/Float64", _numbers(rollout.energy[:, None])),
     ]
     if rollout.reference is not None:
         wanted = rollout.reference
         topics += [
-            topic("/reference", state, joints(wanted.q, wanted.v)),
-            topic("/reference_accelerations", points, _accelerations(names, wanted.a[:, base_v:])),
-            topic("/error", state, _joint_states(names, rollout.error[:, base_v:])),
+            topic("/reference", state, _joint_states(names, wanted.q[:, in_q], wanted.v[:, in_v])),
+            topic("/reference_accelerations", points, _accelerations(names, wanted.a[:, in_v])),
+            topic("/error", state, _joint_states(names, rollout.error[:, in_v])),
+        ]
+    return topics
+
+
+def _ball_topics(rollout: Rollout) -> list[Topic]:
+    n, columns = len(rollout), JointColumns.of(rollout.model)
+    names, in_q, in_v = columns.balls, columns.balls_in_q, columns.balls_in_v
+    flags = rollout.saturated[:, in_v].astype(np.float64)
+
+    def topic(name: str, fields: Fields, first: int = 0, last: int = n + 1) -> Topic:
+        kind = "sensor_msgs/MultiDOFJointState"
+        if name.endswith("accelerations"):
+            kind = "trajectory_msgs/MultiDOFJointTrajectory"
+        return Topic(f"/ball_joints{name}", kind, first, last, fields)
+
+    q, v = rollout.q[:, in_q], rollout.v[:, in_v]
+    topics = [
+        topic("", _ball_states(names, q, v, rollout.tau[:, in_v]), last=n),
+        topic("", _ball_states(names, q, v), first=n),
+        topic("/accelerations", _ball_accelerations(names, rollout.a[:, in_v]), last=n),
+        topic("/saturated", _ball_states(names, torque=flags), last=n),
+    ]
+    if rollout.reference is not None:
+        wanted = rollout.reference
+        topics += [
+            topic("/reference", _ball_states(names, wanted.q[:, in_q], wanted.v[:, in_v])),
+            topic("/reference_accelerations", _ball_accelerations(names, wanted.a[:, in_v])),
+            topic("/error", _ball_states(names, velocity=rollout.error[:, in_v])),
         ]
     return topics
 
@@ -402,6 +480,42 @@ def _accelerations(names: Sequence[str], values: Floats) -> Fields:
         return [*_header(stamps, ""), *_listed(names), 1, *point, *_time(0 * stamps)]
 
     return fields
+
+
+def _ball_states(
+    names: Sequence[str],
+    attitude: Floats = NO_VALUES,
+    velocity: Floats = NO_VALUES,
+    torque: Floats = NO_VALUES,
+) -> Fields:
+    columns = [_after_zeros(x, len(names)) for x in (attitude, velocity, torque)]
+    return lambda stamps, states: [
+        *_header(stamps, ""),
+        *_listed(names),
+        *(field for x in columns for field in _structures(x[states], len(names))),
+    ]
+
+
+def _ball_accelerations(names: Sequence[str], values: Floats) -> Fields:
+    accelerations = _after_zeros(values, len(names))
+    return lambda stamps, states: [
+        *(*_header(stamps, ""), *_listed(names), 1, 0, 0),
+        *_structures(accelerations[states], len(names)),
+        *_time(0 * stamps),
+    ]
+
+
+def _after_zeros(values: Floats, count: int) -> Floats:
+    """Return the numbers of `count` structures of each row, each after a vector of zeros."""
+    if not values.shape[1]:
+        return values
+    rows = values.reshape(len(values), count, -1)
+    return np.concatenate([np.zeros((len(values), count, 3)), rows], axis=2).reshape(len(values), -1)
+
+
+def _structures(values: Floats, count: int) -> list[Field]:
+    """Return a sequence of `count` structures of float64."""
+    return [count, values] if values.shape[1] else [0]
 
 
 def _numbers(values: Floats) -> Fields:

@@ -312,6 +312,65 @@ def test_a_recording_is_read_back(tmp_path: Path, base: str, followed: bool) -> 
             assert np.array_equal(found, wanted)
 
 
+BALLS = """<mujoco model="ball"><compiler angle="radian"/><default><geom mass="50"/></default><worldbody>{}
+<geom type="box" size="0.1 0.2 0.3"/>
+<body name="arm" pos="0 0.1 0.2"><joint name="shoulder" type="ball"/><geom size="0.1" pos="0.1 0.2 0"/>
+<body name="hand" pos="0.3 0 0"><joint name="elbow" axis="0 1 0"/><geom size="0.05" pos="0.1 0 0"/>
+<joint name="wrist" type="slide" axis="1 0 0"/>
+<body name="tip" pos="0.1 0 0"><joint name="ball" type="ball" range="0 2"/><geom size="0.04" pos="0 0 0.1"/>
+</body></body></body>{}</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("followed", [True, False])
+def test_ball_joints_are_read_back_and_stand_in_messages_of_their_own(
+    tmp_path: Path, floating: bool, followed: bool
+) -> None:
+    pytest.importorskip("mcap")
+    around = ('<body name="base"><freejoint/>', "</body>") if floating else ("", "")
+    model = load(BALLS.format(*around))
+    rng = np.random.default_rng(0)
+    goal = model.integrate(model.neutral(), rng.uniform(-1.0, 1.0, model.nv)) if followed else None
+    start = model.integrate(model.neutral(), rng.uniform(-0.5, 0.5, model.nv))
+    law = Thrust(model) if followed else None
+    rollout = simulate(model, law, goal, q0=start, duration=0.02)
+    path = tmp_path / "run.mcap"
+    rollout.save(path)
+    same = Rollout.load(path)
+    assert same.model == model
+    for name in ("q", "v", "a", "tau", "saturated", "rotors"):
+        assert np.array_equal(getattr(same, name), getattr(rollout, name)), name
+    if followed:
+        assert same.reference is not None
+        assert rollout.reference is not None
+        for found, wanted in zip(same.reference, rollout.reference, strict=True):
+            assert np.array_equal(found, wanted)
+    messages, topics, about = read(path)
+    assert json.loads(about["ball_joints"]) == ["shoulder", "ball"]
+    assert topics["/ball_joints"] == ("sensor_msgs/msg/MultiDOFJointState", len(rollout) + 1)
+    assert topics["/ball_joints/accelerations"] == (
+        "trajectory_msgs/msg/MultiDOFJointTrajectory",
+        len(rollout),
+    )
+    for k in (0, 5, len(rollout)):
+        _, state = messages["/ball_joints"][k]
+        assert state.joint_names == ["shoulder", "ball"]
+        for number, name in enumerate(state.joint_names):
+            i, j = model.position_index(name), model.coordinate_index(name)
+            R, twist = state.transforms[number].rotation, state.twist[number]
+            assert [R.x, R.y, R.z, R.w] == rollout.q[k, i : i + 4].tolist()
+            assert [twist.angular.x, twist.angular.y, twist.angular.z] == rollout.v[k, j : j + 3].tolist()
+            assert (twist.linear.x, state.transforms[number].translation.y) == (0.0, 0.0)
+            if k < len(rollout):
+                torque = state.wrench[number].torque
+                assert [torque.x, torque.y, torque.z] == rollout.tau[k, j : j + 3].tolist()
+                (point,) = messages["/ball_joints/accelerations"][k][1].points
+                alpha = point.accelerations[number].angular
+                assert [alpha.x, alpha.y, alpha.z] == rollout.a[k, j : j + 3].tolist()
+        assert (state.wrench == []) == (k == len(rollout))
+        assert messages["/joint_states"][k][1].name == ["elbow", "wrist"]
+
+
 def test_other_recordings_are_refused(tmp_path: Path) -> None:
     pytest.importorskip("mcap")
     rollout = simulate(load(FOLLOWING), duration=0.01)
