@@ -6,6 +6,7 @@ inertias. Values are those of `ours` in the frames of `theirs`.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations, islice
@@ -27,7 +28,6 @@ from dynx.same.skeleton import (
     Skeleton,
     are_alike,
     float_inertia,
-    is_of_reader,
     kind_of,
     subtract,
     transformed,
@@ -418,8 +418,8 @@ def _named_counterparts(ours: Model, theirs: Model) -> dict[str, Joint]:
     """Return the joint of `ours` of the same name, or else with a child link of the same name, by the name of
     the joint of `theirs`: a fixed joint of MJCF has no name, and its link has.
 
-    A fixed joint that a reader adds below another joint of the same body has the counterpart of its name at
-    most, since the other joint holds the body too.
+    A fixed joint that places a link beside another joint, as readers add them, has the counterpart of its
+    name at most, since the other joint holds the link too.
     """
     mine = {joint.name: joint for joint in ours.joints}
     names = {joint.name for joint in theirs.joints}
@@ -436,10 +436,16 @@ def _named_counterparts(ours: Model, theirs: Model) -> dict[str, Joint]:
 
 
 def _added_joints(model: Model) -> Iterator[str]:
-    """Yield the fixed joints that a reader adds between a joint and its body, which lies beside the joint."""
+    """Yield the fixed joints that only place a link beside the joint on which it moves: they hold it on a
+    link without mass that has nothing else."""
     above = {joint.child: joint for joint in model.joints}
+    held = Counter(joint.parent for joint in model.joints)
     for joint in model.joints:
-        if not joint.moves and joint.parent in above and is_of_reader(model, above[joint.parent]):
+        mover = above.get(joint.parent)
+        if joint.moves or mover is None or not mover.moves or held[joint.parent] != 1:
+            continue
+        inertial = model.inertial(joint.parent)
+        if not (inertial.mass or inertial.tensor.any()):
             yield joint.name
 
 

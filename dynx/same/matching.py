@@ -446,8 +446,12 @@ class Matching:
     def _matched_names(self, a: int, b: int) -> tuple[list[tuple[int, int]], list[int], list[int]]:
         matched: list[tuple[int, int]] = []
         left, right = list(self.ours.children[a]), list(self.theirs.children[b])
-        joints = [joint.name for joint in self.ours.joints], [joint.name for joint in self.theirs.joints]
-        for ours, theirs in (joints, (self.ours.named_links, self.theirs.named_links)):
+        both = self.ours, self.theirs
+        for ours, theirs in (
+            ([joint.name for joint in each.joints] for each in both),
+            ([joint.child for joint in each.joints] for each in both),
+            (each.carried_links for each in both),
+        ):
             names = {theirs[j]: j for j in right}
             for i in list(left):
                 j = names.get(ours[i])

@@ -156,15 +156,22 @@ class Skeleton:
         return {body: float_inertia(self.inertia(body)) for body in self.children}
 
     @cached_property
-    def named_links(self) -> list[str]:
-        """Name of the child link of each body's joint, or of the body that the joint is part of in the file
-        if a reader made that link."""
-        below = {joint.parent: joint for joint in self.model.joints}
+    def carried_links(self) -> list[str]:
+        """Name of the first link below each body's joint that is more than a link without mass which holds
+        the next joint: readers make such links, and files state them."""
+        model = self.model
+        below: dict[str, list[Joint]] = {}
+        for joint in model.joints:
+            below.setdefault(joint.parent, []).append(joint)
         found = []
         for joint in self.joints:
-            while is_of_reader(self.model, joint):
-                joint = below[joint.child]
-            found.append(joint.child)
+            link = joint.child
+            while len(below.get(link, ())) == 1:
+                inertial = model.inertial(link)
+                if inertial.mass or inertial.tensor.any():
+                    break
+                link = below[link][0].child
+            found.append(link)
         return found
 
     @cached_property

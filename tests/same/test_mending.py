@@ -393,6 +393,24 @@ def test_joints_on_one_line_are_matched_by_the_bodies_of_the_file() -> None:
     assert {(each.ours, each.theirs) for each in report.coordinates} == {("a", "j_a"), ("b", "j_b")}
 
 
+def test_a_link_without_mass_between_a_joint_and_its_link_is_no_difference() -> None:
+    """A file states the links and the fixed joint that a reader of MJCF would add; the joints are renamed."""
+    between = """<link name="between"/>
+  <joint name="place" type="fixed">
+    <origin xyz="0.1 0.2 0.3"/> <parent link="between"/> <child link="lower"/>
+  </joint>
+</robot>"""
+    other = ARM.replace('name="elbow"', 'name="other"').replace(
+        '<child link="lower"/>', '<child link="between"/>'
+    )
+    other = other.replace('<mass value="0.5"/>', '<origin xyz="-0.1 -0.2 -0.3"/><mass value="0.5"/>')
+    other = other.replace("</robot>", between)
+    for one, two in ((ARM, other), (other, ARM)):
+        report = same_robot(one, two)
+        assert report.same, (report.differences, report.unmatched)
+        assert {(each.kind, each.tag) for each in report.attributes} == {("name", "joint")}
+
+
 def test_a_body_and_a_joint_in_frames_are_mended_in_the_frames() -> None:
     framed = BODIES.replace('<body name="lower"', '<frame pos="0.1 0 0" euler="0 0 0.5"><body name="lower"')
     framed = framed.replace("</body>\n    </body>", "</body></frame>\n    </body>")
