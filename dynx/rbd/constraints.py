@@ -266,6 +266,11 @@ SUFFICIENT = 1e-10
 """Largest residual [m/s or rad/s] after an attempt that ends the search, if `tolerance` is smaller. Redundant
 contacts may leave a little more than `TOLERANCE`, and further attempts do not improve it."""
 
+EXACT = 1e-13
+"""Residual relative to the largest velocity without impulses, above which one more of Newton's steps follows
+below `tolerance`. Without it a body that has come to rest rises or sinks with that residual, since the
+impulses are those of the next steps too, and gains or loses energy."""
+
 ROUNDING = 16.0 * FLOAT64_EPS
 """Residual relative to the largest sum of |G| |x| that is rounding."""
 
@@ -309,6 +314,10 @@ ATTEMPTS = (
     Attempt(40, 3.0, 1e-3, 1e-7),
     Attempt(80, 1.0, 0.0, 1e-9),
     Attempt(80, 0.3, 1e-3, 1e-7),
+    # Where modes still cycle, smaller steps end them.
+    Attempt(80, 1.0, 0.0, 1e-5),
+    Attempt(80, 1.0, 0.0, 1e-4),
+    Attempt(80, 0.3, 0.0, 1e-5),
 )
 
 
@@ -339,13 +348,17 @@ def solve(
         w: Floats = c + G @ at
         for _ in range(attempt.sweeps):
             at, w, _ = sweep(sets, G, numbers, limits, floors, at, w)
-        x = at
+        x, last = at, False
         for count in range(NEWTON_STEPS):
             cautious = count >= CAUTIOUS_FROM and count % 3 == 0
             error, F, J = newton.equations(x, attempt, cautious=cautious)
             if error < least:
                 best, least = x, error
             if error <= tolerance:
+                if last or count == 0 or error <= EXACT * newton.speed:
+                    break
+                last = True
+            elif last:
                 break
             step = _finite_solution(J, -F)
             if step is None:
@@ -390,7 +403,8 @@ class _Newton:
         self, sets: ConstraintSets, G: Floats, c: Floats, g: Floats, limits: Floats, floors: Floats
     ) -> None:
         self._G, self._c, self._g = G, c, g
-        self._speed = float(np.abs(c).max(initial=0.0)) + TINY
+        self.speed = float(np.abs(c).max(initial=0.0)) + TINY
+        """Largest velocity without impulses [m/s or rad/s]."""
         self._unilateral = np.array(sets.unilateral, dtype=np.intp)
         self._floors = floors[self._unilateral]
         self._disks = [disks for rows in (1, 2) if (disks := _Disks(sets, limits, rows)).count]
@@ -416,7 +430,7 @@ class _Newton:
         error = float(np.abs(F).max(initial=0.0)) / min(factor, 1.0)
         part = MOST_PROXIMAL
         if not cautious:
-            part = min(max(attempt.proximal * error / self._speed, attempt.least), MOST_PROXIMAL)
+            part = min(max(attempt.proximal * error / self.speed, attempt.least), MOST_PROXIMAL)
         J.flat[:: len(x) + 1] += part * self._g
         return error, F, J
 
