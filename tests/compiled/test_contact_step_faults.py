@@ -32,7 +32,7 @@ FAULTS = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.dictionaries(st.integers(0, COUNT - 1), FAULTS, min_size=1, max_size=6), st.integers(0, 5))
 def test_lanes_with_faults_show_them_and_change_no_other(
     faults: dict[int, tuple[str, int, float]], seed: int
@@ -56,7 +56,7 @@ def test_lanes_with_faults_show_them_and_change_no_other(
             assert np.isfinite([*impulses[lane], *residual[lane]]).all()
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10_000), st.booleans(), st.sets(st.integers(0, 3), min_size=1), st.booleans())
 def test_links_without_mass_have_a_step_where_the_mass_matrix_is_regular(
     seed: int, floating: bool, massless: set[int], armature: bool

@@ -88,7 +88,7 @@ def step_from(envs: RobotVectorEnvironment, states: Floats) -> tuple[Any, ...]:
     return *envs.step(actions.astype(envs.action_space.dtype)), envs.states
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     st.sampled_from(["walk", "cart_pole"]),
     st.dictionaries(st.integers(0, COUNT - 1), faults(), min_size=1, max_size=4),

@@ -24,7 +24,7 @@ from tests.compiled.test_contact_step_and_worlds import random_robot, scene_of
 H = 2e-3
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     st.integers(0, 10_000),
     st.booleans(),

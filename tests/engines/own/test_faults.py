@@ -53,7 +53,7 @@ def everything(world: World) -> list[list[Floats]]:
     return [[np.array(x) for x in each] for each in (*state.robots.values(), *state.bodies.values())]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     st.sets(st.integers(0, COUNT - 1), min_size=1, max_size=3),
     st.floats(12.0, 59.0),
@@ -93,7 +93,7 @@ def test_copies_that_diverge_are_named_and_the_world_goes_on(
             assert all(map(np.array_equal, mine, wanted))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     st.integers(0, COUNT - 1),
     st.integers(0, 5),
@@ -144,7 +144,7 @@ def bodies_in_one_place() -> st.SearchStrategy[list[SceneBody]]:
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(bodies_in_one_place(), st.floats(0.0, 1.0))
 def test_bodies_that_overlap_at_the_start_are_named_and_gain_no_energy(
     bodies: list[SceneBody], restitution: float
@@ -178,7 +178,7 @@ def is_singular(model: dynx.Model) -> bool:
     return bool(values[0] <= 1e-12 * values[-1])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10_000), st.booleans(), st.sets(st.integers(0, 3), min_size=1))
 def test_links_without_mass_are_refused_by_name_or_move(
     seed: int, floating: bool, massless: set[int]
