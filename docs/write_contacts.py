@@ -25,6 +25,12 @@ from dynx.contacts import find_cases
 
 PAGE = Path(__file__).with_name("contacts.md")
 
+LETTERS = (
+    "In the following laws, g is the gravitational acceleration, and d/dt is the derivative with respect to "
+    "time. Each law explains its other letters."
+)
+"""Paragraph before the list of laws."""
+
 Entry = Mapping[str, Any]
 
 
@@ -68,9 +74,11 @@ def joined(reports: Sequence[Entry]) -> Entry:
 
 
 def cases() -> str:
-    """The table of cases."""
-    rows = ((f"`{case.name}`", case.title, case.law, case.source) for case in find_cases())
-    return table(("case", "title", "law", "source"), rows)
+    """The table of cases, and a list with the law of each case."""
+    found = find_cases()
+    titles = table(("case", "title", "source"), ((f"`{c.name}`", c.title, c.source) for c in found))
+    laws = "".join(f"- `{case.name}`: {case.law}\n" for case in found)
+    return f"{titles}\n{LETTERS}\n\n{laws}"
 
 
 def results(report: Entry) -> dict[str, str]:

@@ -75,7 +75,7 @@ class ContactCase(ABC):
     title: ClassVar[str]
     """Noun phrase that stands alone, such as ``Rebound height``."""
     law: ClassVar[str]
-    """Equation of the exact values in plain text, with the meaning of its letters."""
+    """Equations of the exact values in plain text, then sentences that explain their letters."""
     source: ClassVar[str]
     """Where the equation comes from: a textbook with its section, or the principle from which it follows."""
     trials: ClassVar[Mapping[str, Any]] = {"": None}

@@ -50,12 +50,13 @@ class Capstan(ContactCase):
     name: ClassVar[str] = "capstan"
     title: ClassVar[str] = "A chain around a drum that turns"
     law: ClassVar[str] = (
-        "T' / T = ((1 + mu tan(d / 2)) / (1 - mu tan(d / 2)))^n, for the forces T and T' at the ends of a "
-        "chain with n joints on the drum, at each of which it bends by d, where the drum slides below all of "
-        "them, for friction mu with mu tan(d / 2) < 1; exp(mu n d) for small d"
+        "T' / T = ((1 + mu tan(d / 2)) / (1 - mu tan(d / 2)))^n. For small d, the ratio is exp(mu n d). T "
+        "is the smaller force at one end of the chain, and T' is the larger force at the other end. The "
+        "chain has n joints on the drum. It bends by the angle d at each of these joints. The drum slides "
+        "below all joints. mu is the friction coefficient, and mu tan(d / 2) < 1."
     )
     source: ClassVar[str] = (
-        "balance of forces at each joint with Coulomb's law; for a rope it is the equation of Euler and "
+        "balance of forces at each joint, and Coulomb's law; for a rope this is the equation of Euler and "
         "Eytelwein"
     )
     trials: ClassVar[dict[str, float]] = {"towards the pull": 1.0, "against the pull": -1.0}

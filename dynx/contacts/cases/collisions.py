@@ -38,7 +38,9 @@ class Rebound(ContactCase):
 
     name: ClassVar[str] = "rebound"
     title: ClassVar[str] = "Height of a rebound"
-    law: ClassVar[str] = "h' / h = e^2, for heights h before and h' after the impact and restitution e"
+    law: ClassVar[str] = (
+        "h' / h = e^2. The ball falls from the height h and rebounds to the height h'. e is the restitution."
+    )
     source: ClassVar[str] = "Newton's law of restitution and the conservation of energy in flight"
     trials: ClassVar[dict[str, float]] = {f"restitution {e:g}": e for e in (0.0, 0.5, 0.8, 1.0)}
 
@@ -130,8 +132,9 @@ class FreeMomentum(ContactCase):
     name: ClassVar[str] = "free_momentum"
     title: ClassVar[str] = "Momentum of bodies that collide in free fall"
     law: ClassVar[str] = (
-        "p(t) = p(0) + M g t and L(t) = L(0), for momentum p and angular momentum L about the centre of mass "
-        "of bodies of total mass M; the kinetic energy in the falling frame does not grow"
+        "p(t) = p(0) + M g t, and L(t) = L(0). The kinetic energy relative to the centre of mass does not "
+        "grow. The bodies together have the mass M and the momentum p. L is their angular momentum about "
+        "their common centre of mass. The vector g is gravity."
     )
     source: ClassVar[str] = "conservation of momentum and angular momentum (Newton's third law)"
 
@@ -187,8 +190,8 @@ class CentralCollision(ContactCase):
     name: ClassVar[str] = "collision"
     title: ClassVar[str] = "Central collision of two balls"
     law: ClassVar[str] = (
-        "v2' - v1' = e (v1 - v2) and m1 v1' + m2 v2' = m1 v1 + m2 v2, for speeds v before and v' after the "
-        "impact and restitution e"
+        "v2' - v1' = e (v1 - v2), and m1 v1' + m2 v2' = m1 v1 + m2 v2. The balls have the masses m1 and m2. "
+        "Their speeds are v1 and v2 before the impact, and v1' and v2' after it. e is the restitution."
     )
     source: ClassVar[str] = (
         "Beer and Johnston, Vector Mechanics for Engineers: Dynamics, 9th ed., direct central impact, "
@@ -271,8 +274,14 @@ class NewtonsCradle(ContactCase):
 
     name: ClassVar[str] = "newtons_cradle"
     title: ClassVar[str] = "Newton's cradle"
-    law: ClassVar[str] = "v5' = v1 and v1' = v2' = v3' = v4' = 0: equal masses exchange their speeds"
-    source: ClassVar[str] = "conservation of momentum and energy, for one collision after the other"
+    law: ClassVar[str] = (
+        "v5' = v1, and v1' = v2' = v3' = v4' = 0. Two equal masses that collide exchange their speeds. v1 "
+        "is the speed of the first ball at the start. v1' to v5' are the speeds of the five balls at the "
+        "end."
+    )
+    source: ClassVar[str] = (
+        "conservation of momentum and energy in each collision; one collision follows after the other"
+    )
 
     def scene(self, parameters: None) -> Scene:
         material = Material(friction=0.0, restitution=1.0)
@@ -336,9 +345,11 @@ class SpinningBall(ContactCase):
     name: ClassVar[str] = "spinning_ball"
     title: ClassVar[str] = "Impact of a spinning ball"
     law: ClassVar[str] = (
-        "v' = v - J and w' r = w r - 5/2 J with J = min(mu (u + u'), 2/7 (v + w r)) and u' = e u, for speeds "
-        "v along the ground, u of the fall and u' of the rebound, backspin w, radius r, friction mu and "
-        "restitution e"
+        "u' = e u, v' = v - J, and w' r = w r - 5/2 J. J = min(mu (u + u'), 2/7 (v + w r)) is the impulse "
+        "of friction, divided by the mass. Before the impact, the ball has the speed v along the ground, "
+        "the speed u downwards and the backspin w. After it, the ball has the speed v' along the ground, "
+        "the speed u' upwards and the backspin w'. r is the radius, mu is the friction coefficient, and e "
+        "is the restitution."
     )
     source: ClassVar[str] = (
         "Coulomb's law for the impulses of rigid bodies (Brody, That's how the ball bounces, The Physics "
@@ -433,15 +444,19 @@ class ObliqueImpact(ContactCase):
     name: ClassVar[str] = "oblique_impact"
     title: ClassVar[str] = "Oblique elastic impact of two balls with friction"
     law: ClassVar[str] = (
-        "P = (1 + e) m u and J = min(mu P, 2/7 m s), so that m_i v_i' = m_i v_i +- P +- J and "
-        "2/5 m_i r_i^2 w_i' = -r_i J, for the reduced mass m = m1 m2 / (m1 + m2), the speed u of the "
-        "approach, the slip s, friction mu and restitution e: surfaces slide to the end where "
-        "7 mu (1 + e) u < 2 s, and stick at it otherwise"
+        "P = (1 + e) m u is the impulse along the line of the centres. J = min(mu P, 2/7 m s) is the "
+        "impulse of friction, across this line. For each ball i, m_i v_i' = m_i v_i +- P +- J, and 2/5 m_i "
+        "r_i^2 w_i' = -r_i J. P and J each have opposite signs for the two balls. Ball i has the mass m_i "
+        "and the radius r_i. Its velocity is v_i before the impact and v_i' after it. It has no spin before "
+        "the impact, and the angular velocity w_i' after it. m = m1 m2 / (m1 + m2). The balls approach at "
+        "the speed u. At first their surfaces slide on each other at the speed s. If 7 mu (1 + e) u < 2 s, "
+        "the surfaces slide during the whole impact. Otherwise they stick at its end. mu is the friction "
+        "coefficient, and e is the restitution."
     )
     source: ClassVar[str] = (
-        "Coulomb's law for the impulses of rigid bodies with Newton's restitution, with which those of "
-        "Poisson and Stronge agree here, because friction of two balls does not change the approach "
-        "(Stronge, Impact Mechanics, 2000, ch. 3 and 4)"
+        "Coulomb's law for the impulses of rigid bodies, and Newton's law of restitution. The laws of "
+        "Poisson and Stronge give the same result here, because friction does not change the normal speed "
+        "of two balls (Stronge, Impact Mechanics, 2000, ch. 3 and 4)"
     )
     trials: ClassVar[dict[str, Graze]] = {"slides": Graze(2.0, 0.1), "sticks": Graze(1.0, 0.5)}
 
@@ -536,7 +551,8 @@ class BouncingBall(ContactCase):
     name: ClassVar[str] = "bouncing_ball"
     title: ClassVar[str] = "Sequence of rebounds of a ball"
     law: ClassVar[str] = (
-        "h_n = e^(2n) h in flights of 2 e^n t, for the height h and the time t of the fall and restitution e"
+        "Rebound n has the height h_n = e^(2n) h, and the flight of this rebound lasts 2 e^n t. The first "
+        "fall has the height h and lasts t. e is the restitution."
     )
     source: ClassVar[str] = "Newton's law of restitution and conservation of energy in flight"
 
@@ -609,11 +625,10 @@ class RestitutionPairs(ContactCase):
     name: ClassVar[str] = "restitution_pairs"
     title: ClassVar[str] = "Restitution of two materials"
     law: ClassVar[str] = (
-        "v' = -sqrt(e_a e_b) v, for speeds v before and v' after the impact and the restitution of each"
+        "v' = -sqrt(e_a e_b) v. The two materials have the restitutions e_a and e_b. The ball has the "
+        "velocity v before the impact and v' after it."
     )
-    source: ClassVar[str] = (
-        "Newton's law of restitution, with dynx's rule for two materials: the geometric mean"
-    )
+    source: ClassVar[str] = "Newton's law of restitution; for two materials dynx takes the geometric mean"
     trials: ClassVar[dict[str, RestitutionPair]] = {
         f"{a:g} and {b:g}": RestitutionPair(a, b)
         for a, b in combinations_with_replacement((0.0, 0.25, 0.5, 1.0), 2)

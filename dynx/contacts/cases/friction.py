@@ -43,8 +43,9 @@ class Slope(ContactCase):
     name: ClassVar[str] = "slope"
     title: ClassVar[str] = "A box on a slope: stick and slide"
     law: ClassVar[str] = (
-        "v = 0 where tan(a) < mu, dv/dt = g (sin(a) - mu cos(a)) above, for the angle a of the slope and "
-        "friction mu"
+        "If tan(a) < mu, the box stays at rest: v = 0. If tan(a) > mu, the box slides: dv/dt = g (sin(a) - "
+        "mu cos(a)). The slope has the angle a, and the box has the speed v. mu is the friction "
+        "coefficient."
     )
     source: ClassVar[str] = "Coulomb's law of friction"
     trials: ClassVar[dict[str, float]] = {"tangent 0.4": 0.4, "tangent 1": 1.0}
@@ -98,7 +99,8 @@ class FrictionIsotropy(ContactCase):
     name: ClassVar[str] = "friction_isotropy"
     title: ClassVar[str] = "Friction in several directions"
     law: ClassVar[str] = (
-        "dv/dt = -mu g v / |v|, for friction mu: the same deceleration in every direction, on a straight line"
+        "dv/dt = -mu g v / |v|. Each plate moves on a straight line. The deceleration is the same in every "
+        "direction. The vector v is the velocity of a plate. mu is the friction coefficient."
     )
     source: ClassVar[str] = "Coulomb's law of friction"
 
@@ -166,8 +168,11 @@ class FrictionPairs(ContactCase):
 
     name: ClassVar[str] = "friction_pairs"
     title: ClassVar[str] = "Friction of two materials"
-    law: ClassVar[str] = "mu = sqrt(mu_a mu_b), for the friction of two materials"
-    source: ClassVar[str] = "Coulomb's law, with the rule of dynx for two materials: the geometric mean"
+    law: ClassVar[str] = (
+        "mu = sqrt(mu_a mu_b). The two materials have the friction coefficients mu_a and mu_b. mu is the "
+        "friction coefficient of their contact."
+    )
+    source: ClassVar[str] = "Coulomb's law; for two materials dynx takes the geometric mean"
 
     def scene(self, parameters: None) -> Scene:
         width = 1.5 * len(FRICTION_PAIRS_FRICTION) * FRICTION_PAIRS_SIZE[1]
@@ -237,9 +242,11 @@ class TippingBox(ContactCase):
     name: ClassVar[str] = "tipping_box"
     title: ClassVar[str] = "A tall box on a slope: rest, slide or tip"
     law: ClassVar[str] = (
-        "v = 0 where tan(a) < mu and tan(a) < b / h; dv/dt = g (sin(a) - mu cos(a)) where mu < tan(a), "
-        "b / h; 2/3 r w^2 = g (cos(c - a) - cos(c - a - p)) where b / h < tan(a), mu, for the slope a, "
-        "friction mu, half width b, half height h, r^2 = b^2 + h^2, tan(c) = b / h and the tilt p"
+        "If tan(a) < mu and tan(a) < b / h, the box stays at rest: v = 0. If mu < tan(a) and mu < b / h, "
+        "the box slides: dv/dt = g (sin(a) - mu cos(a)). If b / h < tan(a) and b / h < mu, the box tips: "
+        "2/3 r w^2 = g (cos(c - a) - cos(c - a - p)). The slope has the angle a, and mu is the friction "
+        "coefficient. The box has the half width b, the half height h and the speed v. When it tips, it has "
+        "the tilt p and the angular velocity w. r = sqrt(b^2 + h^2), and tan(c) = b / h."
     )
     source: ClassVar[str] = "balance of moments about the lower edge, and conservation of energy"
     trials: ClassVar[dict[str, Incline]] = {
@@ -317,9 +324,11 @@ class PushedBox(ContactCase):
     name: ClassVar[str] = "pushed_box"
     title: ClassVar[str] = "A box under a push: stay, slide or tip"
     law: ClassVar[str] = (
-        "v = 0 where F < mu m g and F z < m g b; m dv/dt = F - mu m g where F exceeds mu m g alone; "
-        "4/3 m b^2 w^2 = F x - m g y where F z exceeds m g b alone, for a push F at the height z, half the "
-        "edge b, friction mu, and the displacements x of its point and y of the centre"
+        "If F < mu m g and F z < m g b, the box stays at rest: v = 0. If F > mu m g and F z < m g b, the "
+        "box slides: m dv/dt = F - mu m g. If F < mu m g and F z > m g b, the box tips: 4/3 m b^2 w^2 = F x "
+        "- m g y. The box is a cube with the mass m, the edge 2 b and the speed v. The force F pushes at "
+        "the height z. When the box tips, it has the angular velocity w. The point of the force has moved "
+        "by x along the force, and the centre has risen by y. mu is the friction coefficient."
     )
     source: ClassVar[str] = (
         "Coulomb's law, balance of moments about the edge, and the theorem of work and energy"
@@ -375,7 +384,10 @@ class SpinDown(ContactCase):
 
     name: ClassVar[str] = "spin_down"
     title: ClassVar[str] = "Spin of a ball under torsional friction"
-    law: ClassVar[str] = "2/5 m r^2 dw/dt = -c m g until w = 0, for radius r and torsional friction c"
+    law: ClassVar[str] = (
+        "2/5 m r^2 dw/dt = -c m g, until w = 0. The ball has the mass m, the radius r and the angular "
+        "velocity w about the vertical. c is the coefficient of torsional friction [m]."
+    )
     source: ClassVar[str] = "Coulomb's law for the moment about the normal, and Euler's equation"
 
     def scene(self, parameters: None) -> Scene:
@@ -424,11 +436,12 @@ class FastSlide(ContactCase):
     name: ClassVar[str] = "fast_slide"
     title: ClassVar[str] = "A fast slide of a box that must not tip"
     law: ClassVar[str] = (
-        "dv/dt = -mu g and no tilt where mu h < b, for friction mu, half height h and half width b, at any "
-        "speed v"
+        "If mu h < b, the box slides without tilt, at any speed: dv/dt = -mu g. The box has the half width "
+        "b, the half height h and the speed v. mu is the friction coefficient."
     )
     source: ClassVar[str] = (
-        "Coulomb's law, and balance of moments about the centre: the load is at mu h ahead"
+        "Coulomb's law, and balance of moments about the centre: the normal force acts at the distance mu h "
+        "in front of the centre"
     )
     trials: ClassVar[dict[str, SlidingBox]] = {
         "flat": SlidingBox(0.2, 0.1, 0.4),
@@ -496,9 +509,10 @@ class SpinningPlate(ContactCase):
     name: ClassVar[str] = "spinning_plate"
     title: ClassVar[str] = "A flat body that spins on a plane: the pressure below it"
     law: ClassVar[str] = (
-        "k^2 dw/dt = -mu g s with 0 < s <= d for every pressure below the plate, for its radius of gyration "
-        "k, friction mu, the mean distance s of the pressure from the axis and that d of the farthest point; "
-        "under uniform pressure s / d is 0.541 for a square and 2/3 for a disc"
+        "k^2 dw/dt = -mu g s. s is the mean distance of the pressure from the axis. For every distribution "
+        "of the pressure, 0 < s <= d. For uniform pressure, s is 0.541 d for a square and 2/3 d for a disc. "
+        "d is the distance of the farthest point of the plate from the axis. The plate has the angular "
+        "velocity w and the radius of gyration k. mu is the friction coefficient."
     )
     source: ClassVar[str] = "Coulomb's law at every point of the face, and Euler's equation"
     trials: ClassVar[dict[str, Plate]] = {

@@ -40,14 +40,16 @@ class FallingRod(ContactCase):
     name: ClassVar[str] = "falling_rod"
     title: ClassVar[str] = "A rod that falls with one end on the ground"
     law: ClassVar[str] = (
-        "(k^2 + d^2 + s^2) w^2 = 2 g l (cos(a0) - cos(a)) where the end rolls without slipping; "
-        "k^2 dw/dt = (d - mu s) N / m with N / m = g - l (dw/dt sin(a) + w^2 cos(a)) where it slides back; "
-        "for the angle a from the vertical, d = l sin(a), s = r + l cos(a), half length l, end radius r, "
-        "radius of gyration k and friction mu, which is below 4/3, where Painleve's paradox begins"
+        "If the lower end rolls without slipping, (k^2 + d^2 + s^2) w^2 = 2 g l (cos(a0) - cos(a)). If the "
+        "lower end slides back, k^2 dw/dt = (d - mu s) N / m, and N / m = g - l (dw/dt sin(a) + w^2 "
+        "cos(a)). The rod has the angle a from the vertical and the angular velocity w. It starts at rest "
+        "at the angle a0. It has the mass m, the half length l, the radius r of its ends and the radius of "
+        "gyration k. N is the normal force, d = l sin(a), and s = r + l cos(a). The friction coefficient mu "
+        "is below 4/3. Painleve's paradox begins at 4/3."
     )
     source: ClassVar[str] = (
-        "conservation of energy, and Newton's and Euler's equations with Coulomb's law; Genot and Brogliato, "
-        "New results on Painleve paradoxes, European Journal of Mechanics A 18, 1999"
+        "conservation of energy, Newton's and Euler's equations, and Coulomb's law; for the paradox: Genot "
+        "and Brogliato, New results on Painleve paradoxes, European Journal of Mechanics A 18, 1999"
     )
     trials: ClassVar[dict[str, float]] = {"friction 0": 0.0, "friction 0.1": 0.1, "friction 1": 1.0}
 
@@ -132,9 +134,12 @@ class TippeTop(ContactCase):
     name: ClassVar[str] = "tippe_top"
     title: ClassVar[str] = "A tippe top"
     law: ClassVar[str] = (
-        "m dv/dt = N n - mu N u / |u| - m g n and I dw/dt = c x (N n - mu N u / |u|), with N such that the "
-        "centre of the ball keeps its height, for the lever c of the contact from the centre of mass, slip "
-        "u, friction mu, and moments of inertia I that are equal; integrated while it slides"
+        "m dv/dt = N n - mu N u / |u| - m g n. I dw/dt = c x (N n - mu N u / |u|). The normal force N keeps "
+        "the centre of the ball at the same height. dynx integrates these equations over a time in which "
+        "the ball slides. The ball has the mass m and three equal moments of inertia I. The vector v is the "
+        "velocity of the centre of mass, and w is the angular velocity. The vector c leads from the centre "
+        "of mass to the contact. The vector u is the slip velocity of the contact. The unit vector n points "
+        "upwards. mu is the friction coefficient, and the sign x is the cross product."
     )
     source: ClassVar[str] = (
         "Newton's and Euler's equations with Coulomb's law of friction (Cohen, The tippe top revisited, "

@@ -32,7 +32,7 @@ class RestingForce(ContactCase):
 
     name: ClassVar[str] = "resting_force"
     title: ClassVar[str] = "Force of the ground on a body at rest"
-    law: ClassVar[str] = "N = m g, for mass m and gravity g"
+    law: ClassVar[str] = "N = m g. The body has the mass m, and N is the force of the ground."
     source: ClassVar[str] = "balance of forces (Newton's first law)"
     contact_interval: ClassVar[float | None] = RESTING_FORCE_AVERAGING
 
@@ -57,7 +57,9 @@ class RestingDepth(ContactCase):
 
     name: ClassVar[str] = "resting_depth"
     title: ClassVar[str] = "Penetration of a body at rest"
-    law: ClassVar[str] = "z - h / 2 = 0, for the height z of the centre of a body of height h"
+    law: ClassVar[str] = (
+        "z = h / 2. The body has the height h, and its centre is at the height z above the ground."
+    )
     source: ClassVar[str] = "impenetrability of rigid bodies"
 
     def scene(self, parameters: None) -> Scene:
@@ -96,7 +98,8 @@ class Stack(ContactCase):
     name: ClassVar[str] = "stack"
     title: ClassVar[str] = "A stack of ten boxes"
     law: ClassVar[str] = (
-        "N_k = k m g between the k upper boxes and the rest, and height 10 h for boxes of height h"
+        "N_k = k m g, and H = 10 h. Each box has the mass m and the height h. N_k is the force between the "
+        "k upper boxes and the boxes below. H is the height of the stack."
     )
     source: ClassVar[str] = "balance of forces on the boxes above each contact (Newton's first law)"
     contact_interval: ClassVar[float | None] = STACK_AVERAGING
@@ -164,8 +167,9 @@ class StandingRobot(ContactCase):
     name: ClassVar[str] = "standing_robot"
     title: ClassVar[str] = "Forces on the feet of a robot that stands"
     law: ClassVar[str] = (
-        "the forces of all feet add up to the weight, and those of the front feet to m g (c + l) / (2 l) and "
-        "the weight of two feet, for a trunk m with its centre c ahead of the middle and feet at distances l"
+        "All feet together carry the weight of the robot. The two front feet together carry m g (c + l) / "
+        "(2 l) + 2 f g. The trunk has the mass m, and its centre of mass is c ahead of its middle. Each "
+        "foot has the mass f. The front feet are l ahead of the middle, and the rear feet are l behind it."
     )
     source: ClassVar[str] = "balance of forces and moments"
     contact_interval: ClassVar[float | None] = STANDING_ROBOT_AVERAGING
@@ -250,8 +254,10 @@ class DrivenPlatform(ContactCase):
     name: ClassVar[str] = "driven_platform"
     title: ClassVar[str] = "A block on a platform that is driven"
     law: ClassVar[str] = (
-        "(M + m) dv/dt = F where F <= mu g (M + m); above, m dv/dt = mu m g and M dV/dt = F - mu m g, for "
-        "the force F on the platform M with the block m and friction mu"
+        "If F <= mu g (M + m), block and platform move together: (M + m) dv/dt = F. If F is larger, the "
+        "block slides: m dv/dt = mu m g, and M dV/dt = F - mu m g. The force F acts on the platform. The "
+        "platform has the mass M and the speed V. The block has the mass m and the speed v. mu is the "
+        "friction coefficient."
     )
     source: ClassVar[str] = "Newton's second law and Coulomb's law of friction"
     trials: ClassVar[dict[str, float]] = {"sticks": 9.0, "slides": 18.0}

@@ -33,10 +33,11 @@ class Rolling(ContactCase):
     name: ClassVar[str] = "rolling"
     title: ClassVar[str] = "Rolling down a slope without slipping"
     law: ClassVar[str] = (
-        "dv/dt = g sin(a) / (1 + I / (m r^2)): 5/7, 2/3 and 1/2 of g sin(a) for a sphere, a cylinder and a "
-        "hoop of moment of inertia I, mass m and radius r, on a slope of angle a"
+        "dv/dt = g sin(a) / (1 + I / (m r^2)). The result is 5/7 g sin(a) for a sphere, 2/3 g sin(a) for a "
+        "cylinder and 1/2 g sin(a) for a hoop. The slope has the angle a. The body has the mass m, the "
+        "radius r, the moment of inertia I and the speed v."
     )
-    source: ClassVar[str] = "equations of Newton and Euler with the rolling constraint v = omega r"
+    source: ClassVar[str] = "Newton's and Euler's equations with the rolling constraint v = w r"
     trials: ClassVar[dict[str, str]] = {name: name for name in INERTIA_FACTORS}
 
     def scene(self, parameters: str) -> Scene:
@@ -96,8 +97,8 @@ class SlidingToRolling(ContactCase):
     name: ClassVar[str] = "sliding_to_rolling"
     title: ClassVar[str] = "Sliding that turns into rolling"
     law: ClassVar[str] = (
-        "v = 5/7 v0 after t = 2 v0 / (7 mu g), for the speed v0 of a ball that does not spin at first, and "
-        "friction mu"
+        "The ball starts without spin, at the speed v0, and slides until the time t = 2 v0 / (7 mu g). "
+        "After that the ball rolls at the speed v = 5/7 v0. mu is the friction coefficient."
     )
     source: ClassVar[str] = "conservation of the angular momentum about the point of contact"
 
@@ -156,7 +157,10 @@ class RollingResistance(ContactCase):
 
     name: ClassVar[str] = "rolling_resistance"
     title: ClassVar[str] = "A rolling ball under rolling friction"
-    law: ClassVar[str] = "7/5 m dv/dt = -c m g / r, for radius r and rolling friction c"
+    law: ClassVar[str] = (
+        "7/5 m dv/dt = -c m g / r. The ball has the mass m, the radius r and the speed v. c is the "
+        "coefficient of rolling friction [m]."
+    )
     source: ClassVar[str] = (
         "Coulomb's law for the moment that opposes rolling, and Newton's and Euler's equations"
     )

@@ -40,9 +40,11 @@ class FreeWedge(ContactCase):
     name: ClassVar[str] = "free_wedge"
     title: ClassVar[str] = "A block on a wedge that is free to slide"
     law: ClassVar[str] = (
-        "N = m g cos(a) / (1 + m / M sin(a) (sin(a) - mu cos(a))), M dV/dt = -N (sin(a) - mu cos(a)), and "
-        "m (dv/dt + dV/dt cos(a)) = m g sin(a) - mu N where mu < tan(a), for the block m at the speed v down "
-        "the face of the wedge M of angle a, and friction mu between the two"
+        "N = m g cos(a) / (1 + m / M sin(a) (sin(a) - mu cos(a))). M dV/dt = -N (sin(a) - mu cos(a)). m "
+        "(dv/dt + dV/dt cos(a)) = m g sin(a) - mu N. The block slides only if mu < tan(a). N is the normal "
+        "force between block and wedge. The wedge has the mass M, the angle a and the horizontal speed V. "
+        "The block has the mass m and the speed v down the wedge, relative to the wedge. mu is the friction "
+        "coefficient of block and wedge."
     )
     source: ClassVar[str] = "Newton's laws for block and wedge, and Coulomb's law of friction"
     trials: ClassVar[dict[str, float]] = {"friction 0": 0.0, "friction 0.2": 0.2}
@@ -141,8 +143,9 @@ class Conveyor(ContactCase):
     name: ClassVar[str] = "conveyor"
     title: ClassVar[str] = "A block placed on a conveyor"
     law: ClassVar[str] = (
-        "dv/dt = mu g until v = V, after the slide V^2 / (2 mu g) on the belt; v = V from then on, for the "
-        "block's speed v, that of the belt V and friction mu"
+        "At first the block slides: dv/dt = mu g. When v = V, the slide ends. Then the block moves with the "
+        "belt: v = V. The path of the slide, relative to the belt, has the length V^2 / (2 mu g). The block "
+        "has the speed v, and the belt has the speed V. mu is the friction coefficient."
     )
     source: ClassVar[str] = "Newton's second law and Coulomb's law of friction"
 
@@ -190,13 +193,15 @@ class Turntable(ContactCase):
     name: ClassVar[str] = "turntable"
     title: ClassVar[str] = "A block and a ball on a turntable"
     law: ClassVar[str] = (
-        "F = m W^2 r towards the axis and no slip where W^2 r < mu g, for a block at the distance r from the "
-        "axis of a table of angular velocity W; dv/dt = 2/7 W x v, a circle, for a homogeneous ball that "
-        "rolls, without slip where 2/7 W v < mu g, for friction mu"
+        "If W^2 r < mu g, the block does not slip, and the force F = m W^2 r pulls it towards the axis. If "
+        "2/7 W v < mu g, the ball does not slip, and its velocity changes by dv/dt = 2/7 W x v. The ball "
+        "then moves on a circle. W is the angular velocity of the table. The block has the mass m and the "
+        "distance r from the axis. The homogeneous ball rolls with the velocity v. The sign x is the cross "
+        "product. mu is the friction coefficient."
     )
     source: ClassVar[str] = (
-        "Newton's second law; Weltner, Stable circular orbits of freely moving balls on rotating discs, "
-        "American Journal of Physics 47, 1979"
+        "Newton's second law; for the ball: Weltner, Stable circular orbits of freely moving balls on "
+        "rotating discs, American Journal of Physics 47, 1979"
     )
     trials: ClassVar[dict[str, str]] = {"block": "block", "ball": "ball"}
     contact_interval: ClassVar[float | None] = TURNTABLE_AVERAGING
