@@ -19,7 +19,7 @@ from dynx.model.geometry.links import LinkGeometry
 from dynx.rbd.contact_step import Sweeps, contact_rows
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.world import Material, Scene, SceneRobot, World, ground
+from dynx.world import Material, Motor, PositionMotor, Scene, SceneRobot, World, ground
 from dynx.world.preparation import prepare
 from tests.same.rewrites import random_rotation
 from tests.same.test_named_elements import random_inertial
@@ -72,11 +72,11 @@ def scene_of(model: Model, height: float = 0.0) -> Scene:
     return Scene("ground", robots=(SceneRobot("robot", model, material=rough),), bodies=(below,))
 
 
-def world_step(scene: Scene, q: Floats, v: Floats, torque: Floats) -> tuple[Floats, Floats]:
-    """Return q and v after a step of a world."""
+def world_step(scene: Scene, q: Floats, v: Floats, *motors: Motor) -> tuple[Floats, Floats]:
+    """Return q and v after a step of a world with motors."""
     with World(scene, "dynx", H) as world:
         world.set_state(robots={"robot": (q, v)})
-        world.step(torques={"robot": torque})
+        world.step(motors={"robot": motors})
         assert not any("missed" in str(note) for note in world.notes)
         state = world.state.robots["robot"]
         return np.asarray(state.q), np.asarray(state.v)
@@ -90,8 +90,15 @@ OPTIONS = dict.fromkeys(
 
 
 @settings(max_examples=12, deadline=None, phases=NO_SHRINKING, suppress_health_check=list(HealthCheck))
-@given(st.integers(0, 10_000), st.booleans(), st.sampled_from([-1e-3, 0.0, 2e-4]))
-def test_a_random_tree_moves_as_in_a_world(seed: int, floating: bool, gap: float) -> None:
+@given(
+    st.integers(0, 10_000),
+    st.booleans(),
+    st.sampled_from([-1e-3, 0.0, 2e-4]),
+    st.sampled_from([(0.0, 0.0), (50.0, 1.0), (1e4, 100.0)]),
+)
+def test_a_random_tree_moves_as_in_a_world(
+    seed: int, floating: bool, gap: float, gains: tuple[float, float]
+) -> None:
     """Shapes overlap by 1 mm, touch, or close a gap; joints begin inside, at and beyond their limits."""
     rng = np.random.default_rng(seed)
     model = random_robot(rng, floating)
@@ -111,23 +118,22 @@ def test_a_random_tree_moves_as_in_a_world(seed: int, floating: bool, gap: float
     v = v if sum(each * v[model.nv - 1 - k] for k, each in rows[3 * lowest].items()) < 0.0 else -v
     scene = scene_of(model, height)
     touching = shapes_on_plane(prepare(scene, **OPTIONS))
-    text = contact_step_text(model, touching, h=H, kp=0.0, kd=0.0, joint_limits=True, sweeps=TIGHT)
+    (kp, kd), target = gains, rng.uniform(-0.3, 0.3, n)
+    text = contact_step_text(model, touching, h=H, kp=kp, kd=kd, joint_limits=True, sweeps=TIGHT)
     impulses = np.zeros(text.inputs["impulses"])
-    results = text.function(q=q, v=v, target=np.zeros(n), impulses=impulses)
+    results = text.function(q=q, v=v, target=target, impulses=impulses)
     found = {name: np.asarray(values, dtype=float) for name, values in results.items()}
     # Sweeps converge slowly where a heavy part rests on a light one.
     assume(found["residual"][0] < 0.01 * AGREEMENT)
-    wanted_q, wanted_v = world_step(scene, q, v, np.zeros(model.nv))
+    motor = PositionMotor(target, kp, kd)
+    wanted_q, wanted_v = world_step(scene, q, v, motor)
     np.testing.assert_allclose(found["v"], wanted_v, rtol=0.0, atol=AGREEMENT)
     np.testing.assert_allclose(found["q"], wanted_q, rtol=0.0, atol=H * MAX_RESIDUAL)
 
 
 def test_a1_moves_as_in_a_world() -> None:
-    """A motor at the end of a step is a damping and a torque, which worlds have."""
     model, (kp, kd), n = dynx.load("a1", base="floating"), (100.0, 2.0), 3
-    damped = [replace(each, dynamics=JointDynamics(kd + H * kp)) for each in model.joints]
-    other = Model.build("a1", model.links, damped, base="floating", geometry=model.geometry)
-    scene = scene_of(other)
+    scene = scene_of(model)
     # The other shapes are above the ground.
     touching = shapes_on_plane(prepare(scene, **OPTIONS), deepest=True)
     lower = [each for each in touching.shapes if model.mechanism.frames[each.frame].name.endswith("_calf")]
@@ -151,8 +157,7 @@ def test_a1_moves_as_in_a_world() -> None:
     found = dict(zip([port.name for port in kernel.outputs], results, strict=True))
     assert found["residual"].max() < 0.01 * AGREEMENT
     for k in range(n):
-        torque = np.concatenate([np.zeros(6), kp * (target[k] - q[k, 7:])])
-        wanted_q, wanted_v = world_step(scene, q[k], v[k], torque)
+        wanted_q, wanted_v = world_step(scene, q[k], v[k], PositionMotor(target[k], kp, kd))
         np.testing.assert_allclose(found["v"][k], wanted_v, rtol=0.0, atol=AGREEMENT)
         np.testing.assert_allclose(found["q"][k], wanted_q, rtol=0.0, atol=H * MAX_RESIDUAL)
     assert np.count_nonzero(found["impulses"][:, : 3 * len(touching.shapes) : 3], axis=1).min() >= 1
