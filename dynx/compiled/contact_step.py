@@ -80,9 +80,7 @@ def contact_step_text(
         ),
         stop_positions(model) if joint_limits else None,
     )
-    if sweeps is None:
-        sweeps = Sweeps.of_points(redundant=touching.has_redundant_points(mechanism))
-    ends = sweeps
+    bounds = Sweeps() if sweeps is None else sweeps
     sizes = {
         "q": model.nq,
         "v": model.nv,
@@ -91,7 +89,7 @@ def contact_step_text(
     }
 
     def function(**arrays: Any) -> Mapping[str, Array]:
-        return contact_step(mechanism, joints, touching, ends, h, **arrays, regrouped=regrouped)
+        return contact_step(mechanism, joints, touching, bounds, h, **arrays, regrouped=regrouped)
 
     return StepText(function, sizes, "the step with contacts cannot be compiled", repeats=True)
 
