@@ -89,7 +89,7 @@ FLOWS = {
         ),
         (),
         152,
-        25500,
+        25570,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
@@ -97,7 +97,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         104,
-        19000,
+        19030,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
