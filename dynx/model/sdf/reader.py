@@ -370,9 +370,10 @@ class _RobotReader:
         above = first
         for number, each in enumerate(axes):
             direction = R @ each.direction if (R != _NO_ROTATION).any() else each.direction
-            turns = each.type != "prismatic"
+            # A slide has no place, but a joint of another type would have the one that the file states.
+            turns = each.type in ("revolute", "continuous")
             final = number == len(axes) - 1
-            off = turns and bool((point if each.type == "ball" else np.cross(point, direction)).any())
+            off = bool((np.cross(point, direction) if turns else point).any())
             # All axes of one joint meet in its origin.
             chained = not final or off or (len(axes) > 1 and bool(point.any()))
             below = (

@@ -7,7 +7,7 @@
 | `/saturated` | sensor_msgs/JointState | `effort` is 1 if the motor was at its limit, otherwise 0 |
 | `/energy` | std_msgs/Float64 | sum of kinetic and potential energy [J] |
 | `/reference` | sensor_msgs/JointState | reference positions and velocities |
-| `/reference_accelerations` | trajectory_msgs/JointTrajectory | those of the reference, likewise |
+| `/reference_accelerations` | trajectory_msgs/JointTrajectory | accelerations of the reference |
 | `/error` | sensor_msgs/JointState | `position` is the tracking error: the reference minus the position |
 | `/robot_description` | std_msgs/String | the simulated robot as URDF, once, at the beginning |
 
