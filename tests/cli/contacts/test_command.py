@@ -132,7 +132,7 @@ def test_an_unexplained_error_gives_exit_code_1(monkeypatch: pytest.MonkeyPatch)
 def test_the_cases_are_listed() -> None:
     result = run("--list")
     assert result.exit_code == 0
-    assert "slope  A box on a slope: stick and slide\n    v = 0 where" in result.output
+    assert "slope  A box on a slope: stick and slide\n    If tan(a) < mu" in result.output
     refused = run("--list", "--json")
     assert refused.exit_code == 2
     assert "--list runs nothing" in refused.output
