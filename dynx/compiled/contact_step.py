@@ -80,7 +80,9 @@ def contact_step_text(
         ),
         stop_positions(model) if joint_limits else None,
     )
-    bounds = Sweeps() if sweeps is None else sweeps
+    if sweeps is None:
+        sweeps = Sweeps.of_points(redundant=touching.has_redundant_points(mechanism))
+    ends = sweeps
     sizes = {
         "q": model.nq,
         "v": model.nv,
@@ -89,7 +91,7 @@ def contact_step_text(
     }
 
     def function(**arrays: Any) -> Mapping[str, Array]:
-        return contact_step(mechanism, joints, touching, bounds, h, **arrays, regrouped=regrouped)
+        return contact_step(mechanism, joints, touching, ends, h, **arrays, regrouped=regrouped)
 
     return StepText(function, sizes, "the step with contacts cannot be compiled", repeats=True)
 
