@@ -18,6 +18,7 @@ from dynx.engines.mujoco.as_loaded import LoadedMujoco
 from dynx.loaded import installed_engines, load_as
 from dynx.model import Model
 from dynx.model.xml.source import XmlSource
+from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Case, all_rules
 from dynx.rules.registry import find_rule, find_trap, trap_case
 
@@ -314,3 +315,55 @@ def test_an_axis_near_a_coordinate_axis_is_named_in_every_format(form: str) -> N
     report = diagnose(NEAR_AXES[form], engines=["drake"], counterexamples=False)
     assert [(each.rule, each.joint) for each in report.differences] == [("DX226", "turn")]
     assert not report.unexplained
+
+
+@needs_all
+def test_equal_limits_of_sdf_are_named_as_those_of_urdf_are() -> None:
+    text = trap_case("DX712").source.text.replace("<ixy>0.03125</ixy>", "")
+    text = text.replace("<lower>-1</lower><upper>1</upper>", "<lower>0.25</lower><upper>0.25</upper>")
+    report = diagnose(text, base="floating", engines=["pybullet", "drake"], samples=1)
+    assert report.status == "explained", report.unexplained
+    (cause,) = [each for each in report.differences if each.rule == "DX306"]
+    assert (cause.joint, cause.proved) == ("elbow", True)
+
+
+@pytest.mark.parametrize("kind", ["universal", "revolute2"])
+@pytest.mark.parametrize("version", ["1.4", "1.9"])
+def test_a_joint_of_two_axes_is_written_as_the_two_joints_that_dynx_reads(kind: str, version: str) -> None:
+    text = trap_case("DX713").source.text.replace('type="universal"', f'type="{kind}"')
+    text = text.replace('version="1.6"', f'version="{version}"')
+    placed = text.replace("<pose>0.5 0 0 0 0 0</pose>", "<pose>0.5 0 0.25 0.5 -0.25 1</pose>")
+    assert placed != text
+    rule = find_rule("DX713")
+    case = Case(XmlSource(placed), "floating")
+    remedy = rule.remedy(case, rule.detect(case))
+    assert remedy is not None
+    assert not rule.detect(remedy.case)
+    one, other = (each.model for each in (case, remedy.case))
+    assert one.joint_names == other.joint_names == ("elbow_axis", "elbow_axis2")
+    q = one.random(np.random.default_rng(0))
+    for name in ("upper", "lower"):
+        poses = [ReferenceBackend(each).forward_kinematics(q, name) for each in (one, other)]
+        np.testing.assert_allclose(poses[0], poses[1], rtol=0.0, atol=BAR)
+
+
+def test_frames_and_followers_of_a_joint_of_two_axes_keep_their_meaning() -> None:
+    text = trap_case("DX713").source.text.replace('version="1.6"', 'version="1.11"')
+    text = text.replace("<pose>0.5 0 0 0 0 0</pose>", '<pose relative_to="elbow"/>')
+    text = text.replace(
+        "<parent>upper</parent>", '<pose relative_to="upper">0.5 0 0 0 0 0</pose><parent>upper</parent>'
+    )
+    text = text.replace("</model>", '<frame name="tip" attached_to="elbow"/></model>')
+    rule = find_rule("DX713")
+    case = Case(XmlSource(text), "floating")
+    remedy = rule.remedy(case, rule.detect(case))
+    assert remedy is not None
+    written = remedy.case.source.text
+    assert '<frame name="tip" attached_to="elbow_axis2"/>' in written
+    assert [written.count(f'relative_to="elbow_{each}"') for each in ("axis", "axis2")] == [1, 1]
+    model = remedy.case.model
+    assert [each.name for each in model.frames if each.name == "tip"] == ["tip"]
+    before, after = (case.model, model)
+    q = before.random(np.random.default_rng(0))
+    poses = [ReferenceBackend(each).forward_kinematics(q, "tip") for each in (before, after)]
+    np.testing.assert_allclose(poses[0], poses[1], rtol=0.0, atol=BAR)

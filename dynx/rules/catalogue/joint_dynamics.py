@@ -210,8 +210,8 @@ class EmptyDynamics(EditingRule):
 class LimitsAsForces(CallingRule):
     """DX306 limits-as-forces: A joint has two equal limits, and PyBullet pulls the joint to them.
 
-    ``<limit lower="-2" upper="2"/>`` defines the range of a joint. URDF does not define what happens beyond
-    this range. A joint with two equal limits is beyond its range at every other position.
+    ``<limit lower="-2" upper="2"/>`` defines the range of a joint. URDF and SDF do not define what happens
+    beyond this range. A joint with two equal limits is beyond its range at every other position.
 
     - Pinocchio 4.1 and Drake 1.51 ignore limits in inverse and forward dynamics. Only Drake's discrete
       simulation has limits.
@@ -231,6 +231,7 @@ class LimitsAsForces(CallingRule):
     switch limits off.
     """
 
+    formats: ClassVar[tuple[Format, ...]] = ("urdf", "sdf")
     advice = "Write the range of the joint, or switch its limits off."
     engines = measured_on("pybullet")
     calls = ("pybullet.no_limits", "mujoco.no_limits")
@@ -239,11 +240,14 @@ class LimitsAsForces(CallingRule):
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield joints with equal limits."""
         for joint in case.model.joints:
-            limit = case.joints[joint.name].first("limit")
-            if limit is None or "upper" not in limit.attributes:
+            if not joint.moves or joint.limits.lower != joint.limits.upper:
                 continue
-            if joint.moves and joint.limits.lower == joint.limits.upper:
-                message = f"the lower and the upper limit of the joint are {joint.limits.lower:g}"
+            message = f"the lower and the upper limit of the joint are {joint.limits.lower + 0.0:g}"
+            if case.form == "sdf":
+                yield Detection(None, joint.name, joint.line, message)
+                continue
+            limit = case.joints[joint.name].first("limit")
+            if limit is not None and "upper" in limit.attributes:
                 yield found_at(limit, message)
 
 

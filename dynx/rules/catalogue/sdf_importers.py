@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
+from xml.sax.saxutils import escape, quoteattr
 
 from dynx.model.document_format import Format
-from dynx.model.xml.source import Edit, SourceElement
+from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Remedy, Rule, measured_on
 from dynx.rules.joints import fresh_name
 
@@ -64,14 +65,19 @@ class InertiaFromShapesOfSdf(CallingRule):
 
 
 def _is_box(case: Case, link: SourceElement) -> bool:
-    """Check whether the moments of a link are those of the one box that is all its shape."""
+    """Check whether the moments of a link are those of the one box that is all its shape, or are 0 without
+    any shape."""
     collisions = link.all("collision")
     sizes = [each for shape in collisions for each in shape.walk() if each.tag == "size"]
     name = link.attributes.get("name", "")
     names = {each.name for each in case.model.links}
-    if len(collisions) != 1 or len(sizes) != 1 or name not in names:
+    if name not in names or len(collisions) > 1:
         return False
     inertial = case.model.inertial(name)
+    if not collisions:
+        return not inertial.tensor.any()
+    if len(sizes) != 1:
+        return False
     x, y, z = (each * each / 12.0 for each in map(float, case.source.text_in(sizes[0]).split()))
     wanted = [inertial.mass * each for each in (y + z, x + z, x + y)]
     held = [inertial.ixx, inertial.iyy, inertial.izz]
@@ -498,3 +504,106 @@ class ProductsOfInertiaOfSdf(Rule):
                 if element.tag in ("ixy", "ixz", "iyz") and float(case.source.text_in(element) or "0"):
                     yield _found(link, element, f"<{element.tag}> is {case.source.text_in(element)}")
                     break
+
+
+class JointOfTwoAxesOfSdf(EditingRule):
+    """DX713 joint-of-two-axes-of-sdf: A joint of SDF has two axes, which engines refuse or keep as one joint.
+
+    ``universal`` and ``revolute2`` joints have ``<axis>`` and ``<axis2>``. dynx reads them as two revolute
+    joints, ``NAME_axis`` and ``NAME_axis2``, with a link without mass between them.
+
+    - Drake 1.51 reads a universal joint as one joint with two coordinates, so it has no joints with these
+      names and cannot be compared. It refuses ``revolute2``: "Joint type (revolute2) not supported".
+    - PyBullet 3.2.7 (``loadSDF``) refuses the file: "Joint hip has unknown type: universal".
+
+    What to do: write two revolute joints with a link without mass between them, as ``dynx doctor --fix``
+    does. Both joints have the pose of the joint. If a program looks up the joint by its name, also change
+    the program. The rule leaves a joint as it is if its child is in a nested model.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    advice = "Write two revolute joints, with a link without mass between them."
+    engines = measured_on("pybullet", "drake")
+    changed = "wrote two revolute joints in place of each joint of two axes"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield universal and revolute2 joints with both axes, in document order."""
+        names = {each.name for each in case.model.joints}
+        for joint in _parts(case, "joint"):
+            kind = joint.attributes.get("type")
+            if kind in ("universal", "revolute2") and joint.first("axis") and joint.first("axis2"):
+                first = f"{joint.attributes.get('name')}_axis"
+                message = f"the joint is {kind} and has two axes"
+                detection = Detection(None, first if first in names else None, joint.line, message)
+                yield Correction(detection, tuple(_two_joints(case, joint)))
+
+
+_MASSLESS = """<inertial>
+    <mass>0</mass>
+    <inertia><ixx>0</ixx><ixy>0</ixy><ixz>0</ixz><iyy>0</iyy><iyz>0</iyz><izz>0</izz></inertia>
+  </inertial>"""
+
+
+def _two_joints(case: Case, joint: SourceElement) -> Iterator[Edit]:
+    """Yield the edits that write a joint of two axes as two joints; none if its child is not in its model."""
+    source, model, name = case.source, joint.parent, joint.attributes.get("name", "")
+    child, second = joint.first("child"), joint.first("axis2")
+    if model is None or child is None or second is None:
+        return
+    carried = source.text_in(child)
+    links = [each for each in model.all("link") if each.attributes.get("name") == carried]
+    if len(links) != 1:
+        return
+    taken = {each.attributes.get("name", "") for each in model.children} - {name}
+    names = [fresh_name(f"{name}_{tag}", taken) for tag in ("axis", "axis2")]
+    between = fresh_name(f"{names[0]}_link", taken)
+    # The frame of a joint is attached to its child, so whatever is placed in it follows the second joint.
+    for element in model.walk():
+        if element.tag == "mimic":
+            follows = element.attributes.get("joint") == name
+            wanted = names[element.attributes.get("axis") == "axis2"]
+            if follows:
+                yield source.attribute_edit(element, "joint", wanted)
+            continue
+        for key in ("relative_to", "attached_to", "expressed_in"):
+            if element.attributes.get(key) == name and not _is_inside(element, second):
+                yield source.attribute_edit(element, key, names[1])
+    yield source.attribute_edit(joint, "name", names[0])
+    yield source.attribute_edit(joint, "type", "revolute")
+    yield source.replacement(child, f"<child>{escape(between)}</child>")
+    yield source.removal(second)
+    pose = links[0].first("pose")
+    placed = "" if pose is None else _renamed(_text_of(source, pose), name, names[0])
+    own = joint.first("pose")
+    parts = [
+        f"<parent>{escape(between)}</parent>",
+        f"<child>{escape(carried)}</child>",
+        *([] if own is None else [_text_of(source, own)]),
+        _renamed(re.sub(r"\baxis2(?=\s*[>/])", "axis", _text_of(source, second)), name, names[1]),
+    ]
+    lines = [f"<link name={quoteattr(between)}>", *([f"  {placed}"] if placed else []), f"  {_MASSLESS}"]
+    lines += ["</link>", f'<joint name={quoteattr(names[1])} type="revolute">']
+    lines += ["  " + each.replace("\n", "\n  ") for each in parts]
+    lines.append("</joint>")
+    yield source.insertion_after(joint, "\n".join(lines))
+
+
+def _is_inside(element: SourceElement, around: SourceElement) -> bool:
+    return around.span.start <= element.span.start and element.span.end <= around.span.end
+
+
+def _text_of(source: XmlSource, element: SourceElement) -> str:
+    """Return an element as it is written, with two blanks for each level of indentation below it."""
+    first, *rest = element.data[element.span.start : element.span.end].decode().splitlines()
+    bare = [line.lstrip() for line in rest]
+    levels = [(line[: len(line) - len(own)]).count(source.unit) for line, own in zip(rest, bare, strict=True)]
+    outer = source.indent_of(element).count(source.unit)
+    inner = (f"{'  ' * max(each - outer, 0)}{own}" for each, own in zip(levels, bare, strict=True))
+    return "\n".join([first, *inner])
+
+
+def _renamed(text: str, name: str, new: str) -> str:
+    """Return the text of an element in which poses and axes are stated in a frame with another name."""
+    stated = rf"""\b(relative_to|expressed_in)\s*=\s*(["'])({re.escape(escape(name))})\2"""
+    return re.sub(stated, lambda found: f"{found[1]}={quoteattr(new)}", text)
