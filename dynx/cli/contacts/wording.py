@@ -14,7 +14,10 @@ RANKS = ("within", "falls", "cannot", "setting", "unexplained")
 VERDICT_MEANINGS = {
     "within": "the error is within the tolerance at every time step",
     "falls": "the error falls when the time step becomes shorter",
-    "setting": "the error stays, and a setting of the engine is its cause, as a run with another value shows",
+    "setting": (
+        "the error stays. A setting of the engine is the cause: a run with another value of the setting "
+        "shows this"
+    ),
     "cannot": "the exact value needs a parameter that the engine does not have",
     "unexplained": "the error stays, and no setting that dynx tries is its cause",
 }
