@@ -48,7 +48,7 @@ shapes do not affect the verdict |
 | joints without counterpart | number of joints that only one file has. Joints behind such a joint are not \
 counted |
 | largest difference | the element with the largest difference |
-| engines | how much two engines differ that load the files without dynx |
+| engines | two engines load the files without dynx. The column states how much the two robots differ |
 
 **Engines.** Pinocchio loads the URDF file. MuJoCo loads the MJCF file, or Drake loads the SDF file. The
 column has the largest relative difference of total mass and joint-space inertia between the two engines. For
