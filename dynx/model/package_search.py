@@ -133,8 +133,10 @@ def package_of(name: str, folder: Path, elsewhere: tuple[Path, ...]) -> Path | N
 
     It is a folder of that name: one of the description, or one above it or beside one of these if it is
     marked as a package or, above, has the usual parts of one. Else it is the nearest package of the
-    repository whose manifest states the name, as ROS names packages, or a folder of the environment,
-    `elsewhere`. The name alone is no evidence outside the repository, because the description chooses it.
+    repository whose manifest states the name, as ROS names packages, or the nearest folder of that name that
+    holds a model of Gazebo, such as ``models/NAME`` beside ``worlds``. Else it is a folder of the
+    environment, `elsewhere`. The name alone is no evidence outside the repository, because the description
+    chooses it.
     """
     enclosing = enclosing_folder(folder)
     for root in (folder, *folder.parents):
@@ -149,13 +151,17 @@ def package_of(name: str, folder: Path, elsewhere: tuple[Path, ...]) -> Path | N
 
 
 def _by_manifest(name: str, folder: Path, enclosing: Path) -> Path | None:
-    """Return the package below `enclosing` of that name that has the most folders in common with `folder`."""
+    """Return the package or model below `enclosing` of that name that has the most folders in common with
+    `folder`."""
     if not any((enclosing / marker).exists() for marker in (".git", *MANIFESTS)):
         return None  # A folder of downloads, say, which is as large as it may be.
     found = [package for package, stated in _packages(enclosing) if stated == name]
+    found = found or [model for model in _models(enclosing) if model.name == name]
 
-    def nearness(package: Path) -> tuple[int, int, str]:
-        return -len(os.path.commonpath([package, folder])), len(package.parts), str(package)
+    def nearness(package: Path) -> tuple[int, bool, int, str]:
+        common = len(os.path.commonpath([package, folder]))
+        # Repositories keep models of their own and downloaded ones in folders beside each other.
+        return -common, package.parent.name != "models", len(package.parts), str(package)
 
     return min(found, key=nearness, default=None)
 
@@ -164,6 +170,12 @@ def _by_manifest(name: str, folder: Path, enclosing: Path) -> Path | None:
 def _packages(root: Path) -> tuple[tuple[Path, str], ...]:
     """Return the packages below a folder, each with the name that its manifest states."""
     return tuple((folder, name) for folder in _folders(root) if (name := _stated_name(folder)))
+
+
+@lru_cache(maxsize=16)
+def _models(root: Path) -> tuple[Path, ...]:
+    """Return the folders below a folder that hold a model of Gazebo."""
+    return tuple(folder for folder in _folders(root) if os.path.isfile(folder / MODEL_MANIFEST))
 
 
 def _folders(root: Path) -> Iterator[Path]:

@@ -15,6 +15,7 @@ from dynx.agreement.tolerances import BAR
 from dynx.doctor.diagnosis import compare_as_loaded, diagnose, open_case
 from dynx.doctor.examination import EngineProcess, EngineTask, Examiner, temporary_document
 from dynx.engines.mujoco.as_loaded import LoadedMujoco
+from dynx.errors import DescriptionError
 from dynx.loaded import installed_engines, load_as
 from dynx.model import Model
 from dynx.model.xml.source import XmlSource
@@ -367,3 +368,37 @@ def test_frames_and_followers_of_a_joint_of_two_axes_keep_their_meaning() -> Non
     q = before.random(np.random.default_rng(0))
     poses = [ReferenceBackend(each).forward_kinematics(q, "tip") for each in (before, after)]
     np.testing.assert_allclose(poses[0], poses[1], rtol=0.0, atol=BAR)
+
+
+SUN = "<include><uri>model://sun</uri></include>"
+GROUND = "<include><uri>https://example.org/models/Ground Plane</uri></include>"
+
+
+@needs_all
+def test_the_sun_and_the_ground_of_gazebo_are_left_out_where_they_are_not_found() -> None:
+    text = trap_case("DX712").source.text.replace("<ixy>0.03125</ixy>", "")
+    inner = text[text.index("<model") : text.rindex("</sdf>")]
+    text = text.replace(inner, f'<world name="w">{SUN}{GROUND}{inner}</world>')
+    notes = [each for each in dynx.load(text).notes if "Gazebo" in each.message]
+    assert len(notes) == 2
+    report = diagnose(text, base="floating", engines=["pybullet", "drake"], samples=1)
+    assert report.status == "explained", report.unexplained
+    assert {each.rule for each in report.differences} == {"DX711"}
+    with pytest.raises(DescriptionError, match="table"):
+        dynx.load(text.replace("model://sun", "model://table"))
+
+
+def test_the_ground_of_gazebo_is_read_where_it_is_found(tmp_path: Path) -> None:
+    ground = '<model name="ground"><static>1</static><link name="plate"/></model>'
+    (tmp_path / "models/ground_plane").mkdir(parents=True)
+    (tmp_path / "worlds").mkdir()
+    (tmp_path / ".git").mkdir()
+    (tmp_path / "models/ground_plane/model.sdf").write_text(f'<sdf version="1.6">{ground}</sdf>')
+    manifest = '<model><sdf version="1.6">model.sdf</sdf></model>'
+    (tmp_path / "models/ground_plane/model.config").write_text(manifest)
+    include = GROUND.replace("https://example.org/models/Ground Plane", "model://ground_plane")
+    crane = SDF[SDF.index("<model") : SDF.index("</sdf>")]
+    world = f'<sdf version="1.6"><world name="w">{include}{crane}</world></sdf>'
+    (tmp_path / "worlds/w.world").write_text(world)
+    model = dynx.load(tmp_path / "worlds/w.world")
+    assert not [each for each in model.notes if "Gazebo" in each.message]

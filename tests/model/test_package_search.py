@@ -48,6 +48,19 @@ def test_of_two_packages_of_a_name_the_nearer_one_counts(repository: Path) -> No
     assert package_of("gripper", repository / "archive", ()) == far
 
 
+def test_a_model_of_gazebo_is_found_in_the_repository_by_the_name_of_its_folder(repository: Path) -> None:
+    worlds = repository / "src/arm/worlds"
+    for name in ("fuel_models/table", "models/table", "models/chair"):
+        (repository / "src/arm" / name).mkdir(parents=True)
+    assert package_of("table", worlds, ()) is None
+    package_search.package_of.cache_clear()
+    package_search._models.cache_clear()
+    for name in ("fuel_models/table", "models/table"):
+        (repository / "src/arm" / name / "model.config").touch()
+    assert package_of("table", worlds, ()) == repository / "src/arm/models/table"
+    assert package_of("chair", worlds, ()) is None
+
+
 def test_hidden_folders_links_and_folders_outside_are_not_searched(repository: Path) -> None:
     outside = _package(repository.parent / "elsewhere/gripper-v1", "gripper")
     _package(repository / ".cache/gripper-v1", "gripper")

@@ -94,7 +94,8 @@ def model_folders(path: Path) -> dict[str, Path]:
     """Return the folders of the models that a document in SDF includes as ``model://NAME``, and of those that
     they include, by name.
 
-    Each is looked for around its document, in no more folders than links lead to (`dynx.doctor.examination`).
+    Each is looked for around its document, also in folders ``models`` there, in no more folders than links
+    lead to (`dynx.doctor.examination`).
     """
     found: dict[str, Path] = {}
     waiting = [path]
@@ -102,8 +103,8 @@ def model_folders(path: Path) -> dict[str, Path]:
         document = waiting.pop()
         for encoded in _MODEL_NAME.findall(read_file(str(document))):
             name = encoded.decode(errors="replace")
-            folders = [] if name in found else [above / name for above in document.parents[:_FOLDERS_ABOVE]]
-            for folder in folders:
+            around = [] if name in found else document.parents[:_FOLDERS_ABOVE]
+            for folder in (above / below / name for above in around for below in ("", "models")):
                 if (folder / MODEL_MANIFEST).is_file():
                     found[name] = folder
                     waiting += sorted(folder.glob("*.sdf"))

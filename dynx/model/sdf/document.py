@@ -317,7 +317,7 @@ class _ScopeReader:
                 self._add_part(scope, child)
             elif child.tag == "model":
                 self._add_model(scope, self._scope(child, scope, version))
-            elif child.tag == "include":
+            elif child.tag == "include" and not self._is_absent_scenery(child):
                 self._add_model(scope, self._included(child, scope))
         return scope
 
@@ -373,6 +373,20 @@ class _ScopeReader:
         scope.content.append(model)
 
     # -- included files -------------------------------------------------------------------------
+
+    def _is_absent_scenery(self, include: Element) -> bool:
+        """Check whether an include names the sun or the ground of Gazebo, which moves nothing, and which is
+        not there; note that it is not read."""
+        uri = self._reading.word(include, "uri", "an <include>") or ""
+        scenery = scenery_of(uri)
+        if scenery is None:
+            return False
+        try:
+            find_file(self._reading, include, f"{uri.rstrip('/')}/{MODEL_MANIFEST}", self._package_dirs)
+        except MeshNotFoundError:
+            self._reading.note(include, f"{shown(uri, 200)} was not found and is not read: {scenery}")
+            return True
+        return False
 
     def _included(self, include: Element, scope: Scope) -> Scope:
         reading = self._reading
@@ -450,6 +464,22 @@ class _ScopeReader:
             return find_file(self._reading, include, name, self._package_dirs)
         except MeshNotFoundError as error:
             raise self._reading.error(include, f"{shown(uri, 200)} is not included: {error}") from None
+
+
+_SCENERY = re.compile(r"(?:model://|https?://\S+/models/)(?:(sun)|ground(?:_| |%20)plane)/?", re.IGNORECASE)
+
+
+def scenery_of(uri: str) -> str | None:
+    """Describe the light or the ground of most worlds, which Gazebo brings along, where a URI names it; None
+    for any other model."""
+    found = _SCENERY.fullmatch(uri)
+    if found is None:
+        return None
+    return (
+        "a light of Gazebo"
+        if found[1]
+        else "a plane of Gazebo that does not move; the floor is that of the scene"
+    )
 
 
 def find_file(reading: SdfReading, element: Element, uri: str, package_dirs: Iterable[StrPath]) -> str:

@@ -8,6 +8,9 @@ from typing import ClassVar
 from xml.sax.saxutils import escape, quoteattr
 
 from dynx.model.document_format import Format
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh
+from dynx.model.package_search import MODEL_MANIFEST
+from dynx.model.sdf.document import scenery_of
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Remedy, Rule, measured_on
 from dynx.rules.joints import fresh_name
@@ -440,8 +443,12 @@ class ModelsInOtherFolders(CallingRule):
       not ``model://arm``.
     - PyBullet 3.2.7 (``loadSDF``) ignores ``<include>`` (DX708).
 
-    What to do: end the URI with a slash, as ``dynx doctor --fix`` does. Add each folder to the package map
-    before Drake reads the file; the doctor prints this call.
+    Most worlds include ``model://sun`` and ``model://ground_plane``, which Gazebo brings along. dynx reads
+    the file without them where they are not found.
+
+    What to do: end the URI with a slash, as ``dynx doctor --fix`` does. It removes the sun and the ground
+    where they are not found. Add each folder to the package map before Drake reads the file; the doctor
+    prints this call.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -455,20 +462,34 @@ class ModelsInOtherFolders(CallingRule):
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield includes by the name of a model."""
         for element in case.source.root.walk():
-            if element.tag == "include" and _uri(case, element).startswith("model://"):
+            uri = _uri(case, element)
+            if element.tag == "include" and (uri.startswith("model://") or scenery_of(uri)):
                 yield Detection(None, None, element.line, f"the file includes {_uri(case, element)}")
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
         """Return the case with the call, and with a slash after the name of each model."""
-        includes = [each for each in case.source.root.walk() if each.tag == "include"]
+        every = [each for each in case.source.root.walk() if each.tag == "include"]
+        absent = [each for each in every if _is_absent_scenery(case, _uri(case, each))]
+        includes = [each for each in every if each not in absent]
         uris = [each.first("uri") for each in includes if _MODEL.fullmatch(_uri(case, each))]
         edits = [
             case.source.replacement(uri, f"<uri>{case.source.text_in(uri)}/</uri>")
             for uri in uris
             if uri is not None
-        ]
+        ] + [case.source.removal(each) for each in absent]
         called = case.with_source(case.source.apply(*edits)).with_calls(*self.calls)
-        return Remedy(called, self.changed)
+        removed = "removed the sun and the ground of Gazebo, which were not found"
+        parts = [self.changed] * bool(len(every) - len(absent)) + [removed] * bool(absent)
+        return Remedy(called, " and ".join(parts))
+
+
+def _is_absent_scenery(case: Case, uri: str) -> bool:
+    """Check whether a URI names the sun or the ground of Gazebo, and no file around the text is that."""
+    try:
+        manifest = f"{uri.rstrip('/')}/{MODEL_MANIFEST}"
+        return scenery_of(uri) is not None and find_mesh(manifest, case.source.source) is None
+    except MeshNotFoundError:
+        return True
 
 
 _MODEL = re.compile("model://[^/]+")
