@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -978,7 +978,7 @@ def judged(
     if named and len(report.differences) == 1:
         return "right" if not attributes else f"right, extra: {told}"
     if len(report.differences) == 1 and report.mended_text is not None:
-        other = _mended_difference(a, b[1], report.mended_text.decode(), to, floating, seed)
+        other = _mended_difference(a, b[1], report, to, floating, seed)
         if other < 1e-5:
             return f"right (equivalent): {told}"
         return f"misnamed: {told}; its mended file differs by {other:.1e}"
@@ -986,10 +986,15 @@ def judged(
 
 
 def _mended_difference(
-    a: tuple[Robot, str, Format], it: Rewritten, mended: str, to: Format, floating: bool, seed: int
+    a: tuple[Robot, str, Format], it: Rewritten, report: Any, to: Format, floating: bool, seed: int
 ) -> float:
+    """Return how far the engines see the mended file from the first one, with the frame of a floating base
+    that the report states: another inertia of the base may explain a turned joint, in another frame."""
+    by = it.by
+    if report.T_first_second is not None:
+        by = replace(by, T_root=report.T_first_second)
     try:
-        return text_difference(a, (it.robot, mended, to), floating, seed, it.by)
+        return text_difference(a, (it.robot, report.mended_text.decode(), to), floating, seed, by)
     except Exception:
         return float("inf")
 
