@@ -86,11 +86,11 @@ def page(entries: Sequence[Entry]) -> str:
         "- *effect*: the change of an engine's result when dynx removes only this cause, relative to the "
         "largest reference value. If the cause has several places or affects several engines, this is the "
         "largest effect. `no answer` means that the engine refuses the file, or cannot compute the quantity, "
-        "until the cause is removed. `present` means that the cause changes contact forces. For these the "
-        "table has no number.",
+        "until the cause is removed. `present` means that the cause changes contact forces. For contact "
+        "forces the table has no number.",
         "- *engines*: the engines that the cause affects.",
         "",
-        "[Public files](public_files.md) has figures on files on which the doctor was not developed.",
+        "[Public files](public_files.md) has figures on files that were not used to develop the doctor.",
         "",
     ]
     for group, title in GROUPS.items():
