@@ -83,7 +83,7 @@ ON_FEET: Mapping[str, Mapping[str, Recipe]] = {
     "ppo": {
         "Walk": _recipe(
             1024,
-            16_000_000,
+            12_000_000,
             normalize=True,
             n_steps=24,
             batch_size=6144,
