@@ -98,11 +98,12 @@ def conditions(report: Entry) -> str:
     engines = ", ".join(f"{each['engine']} {each['version']}" for each in report["engines"])
     found = [each["verdict"] for case in report["cases"] for each in case["figures"]]
     counts = ", ".join(f"{found.count(each)} {each}" for each in wording.RANKS if each in found)
-    verdict_counts = {each: found.count(each) for each in wording.RANKS}
+    unexplained = found.count("unexplained")
     return (
-        f"Written by `python -m docs.write_contacts` for {engines}, at steps of "
-        f"{wording.steps_text(report['steps'])}: {len(found)} figures of {len(report['cases'])} cases "
-        f"({counts}), {report['runs']} runs. {wording.headline(verdict_counts)}\n"
+        f"`python -m docs.write_contacts` measured {len(found)} figures of {len(report['cases'])} cases "
+        f"({counts}), in {report['runs']} runs. The engines are {engines}. The time steps are "
+        f"{wording.steps_text(report['steps'])}. "
+        f"{f'{unexplained} errors are' if unexplained else 'No error is'} unexplained.\n"
     )
 
 
