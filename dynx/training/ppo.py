@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dynx.envs.library import spaces
 from dynx.simd.threads import run_parts
 from dynx.training.library import PPO, explained_variance, torch
 from dynx.training.schedules import SteadyDivergence
@@ -130,7 +131,7 @@ class ThreadedPPO(PPO):  # type: ignore[misc]  # stable-baselines3 is not follow
         # The distribution of actions keeps its parameters, of the present part here.
         policy, actions = copy(self.policy), batch.actions
         policy.action_dist = copy(policy.action_dist)
-        if not hasattr(self.action_space, "low"):  # choices
+        if isinstance(self.action_space, spaces.Discrete):
             actions = actions.long().flatten()
         values, log_prob, entropy = policy.evaluate_actions(batch.observations, actions)
         values = values.flatten()

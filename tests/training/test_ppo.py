@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 import torch
@@ -17,6 +18,7 @@ from dynx.training import Schedule, TaskSpec, make_vector, train
 from dynx.training import ppo as module
 from dynx.training.algorithms import new_algorithm
 from dynx.training.checkpoints import Checkpoints
+from dynx.training.library import DummyVecEnv
 from dynx.training.ppo import ThreadedPPO
 from dynx.training.schedules import MAX_RATE, MIN_RATE, START_RATE, SteadyDivergence, schedule_of
 from tests.training.runs import small_run
@@ -55,6 +57,29 @@ def test_updates_in_parts_are_those_of_stable_baselines(
     ours, theirs = (learned(kind, task, **options) for kind in (ThreadedPPO, PPO))
     for name, weights in theirs.items():
         np.testing.assert_allclose(ours[name], weights, rtol=RTOL, atol=ATOL)
+
+
+class TwoChoices(gymnasium.Env[Any, Any]):
+    """Two choices in each step; the reward is their sum."""
+
+    observation_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+    action_space = gymnasium.spaces.MultiDiscrete([2, 3])
+
+    def reset(self, **options: Any) -> tuple[Any, dict[str, Any]]:
+        return np.zeros(2, dtype=np.float32), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        return np.ones(2, dtype=np.float32), float(np.sum(action)), False, False, {}
+
+
+def test_actions_of_several_choices_are_learned_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "PART", 24)
+    found = []
+    for kind in (ThreadedPPO, PPO):
+        vector = DummyVecEnv([TwoChoices] * 4)
+        found.append(kind("MlpPolicy", vector, **OPTIONS).learn(64).policy.state_dict())
+    for name, weights in found[1].items():
+        np.testing.assert_allclose(found[0][name], weights, rtol=RTOL, atol=ATOL)
 
 
 def test_weights_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
