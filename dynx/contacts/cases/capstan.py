@@ -50,10 +50,10 @@ class Capstan(ContactCase):
     name: ClassVar[str] = "capstan"
     title: ClassVar[str] = "A chain around a drum that turns"
     law: ClassVar[str] = (
-        "T' / T = ((1 + mu tan(d / 2)) / (1 - mu tan(d / 2)))^n. For small d, the ratio is exp(mu n d). T "
-        "is the smaller force at one end of the chain, and T' is the larger force at the other end. The "
-        "chain has n joints on the drum. It bends by the angle d at each of these joints. The drum slides "
-        "below all joints. mu is the friction coefficient, and mu tan(d / 2) < 1."
+        "T' / T = ((1 + mu tan(d / 2)) / (1 - mu tan(d / 2)))^n. For small d, this ratio is close to exp(mu "
+        "n d). T is the smaller force at one end of the chain, and T' is the larger force at the other end. "
+        "The chain has n joints on the drum. It bends by the angle d at each of these joints. The drum "
+        "slides below all joints. mu is the friction coefficient, and mu tan(d / 2) < 1."
     )
     source: ClassVar[str] = (
         "balance of forces at each joint, and Coulomb's law; for a rope this is the equation of Euler and "

@@ -628,7 +628,9 @@ class RestitutionPairs(ContactCase):
         "v' = -sqrt(e_a e_b) v. The two materials have the restitutions e_a and e_b. The ball has the "
         "velocity v before the impact and v' after it."
     )
-    source: ClassVar[str] = "Newton's law of restitution; for two materials dynx takes the geometric mean"
+    source: ClassVar[str] = (
+        "Newton's law of restitution; for two materials dynx takes the geometric mean of their restitutions"
+    )
     trials: ClassVar[dict[str, RestitutionPair]] = {
         f"{a:g} and {b:g}": RestitutionPair(a, b)
         for a, b in combinations_with_replacement((0.0, 0.25, 0.5, 1.0), 2)

@@ -172,7 +172,9 @@ class FrictionPairs(ContactCase):
         "mu = sqrt(mu_a mu_b). The two materials have the friction coefficients mu_a and mu_b. mu is the "
         "friction coefficient of their contact."
     )
-    source: ClassVar[str] = "Coulomb's law; for two materials dynx takes the geometric mean"
+    source: ClassVar[str] = (
+        "Coulomb's law; for two materials dynx takes the geometric mean of their friction coefficients"
+    )
 
     def scene(self, parameters: None) -> Scene:
         width = 1.5 * len(FRICTION_PAIRS_FRICTION) * FRICTION_PAIRS_SIZE[1]
@@ -327,8 +329,9 @@ class PushedBox(ContactCase):
         "If F < mu m g and F z < m g b, the box stays at rest: v = 0. If F > mu m g and F z < m g b, the "
         "box slides: m dv/dt = F - mu m g. If F < mu m g and F z > m g b, the box tips: 4/3 m b^2 w^2 = F x "
         "- m g y. The box is a cube with the mass m, the edge 2 b and the speed v. The force F pushes at "
-        "the height z. When the box tips, it has the angular velocity w. The point of the force has moved "
-        "by x along the force, and the centre has risen by y. mu is the friction coefficient."
+        "the height z. When the box tips, it has the angular velocity w. The point at which the force acts "
+        "has moved by x in the direction of the force. The centre has risen by y. mu is the friction "
+        "coefficient."
     )
     source: ClassVar[str] = (
         "Coulomb's law, balance of moments about the edge, and the theorem of work and energy"
