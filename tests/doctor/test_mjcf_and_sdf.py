@@ -402,3 +402,13 @@ def test_the_ground_of_gazebo_is_read_where_it_is_found(tmp_path: Path) -> None:
     (tmp_path / "worlds/w.world").write_text(world)
     model = dynx.load(tmp_path / "worlds/w.world")
     assert not [each for each in model.notes if "Gazebo" in each.message]
+
+
+def test_the_state_of_a_world_has_no_links_of_its_own() -> None:
+    text = trap_case("DX712").source.text
+    inner = text[text.index("<model") : text.rindex("</sdf>")]
+    link = '<link name="upper"><pose>1 0 0 0 0 0</pose></link>'
+    state = f'<state world_name="w"><model name="m">{link}</model></state>'
+    world = text.replace(inner, f'<world name="w">{inner}{state}</world>')
+    alone, beside = (find_rule("DX701").detect(Case(XmlSource(each), "floating")) for each in (text, world))
+    assert [each.link for each in beside] == [each.link for each in alone]

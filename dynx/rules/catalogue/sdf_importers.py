@@ -17,10 +17,18 @@ from dynx.rules.joints import fresh_name
 
 
 def _parts(case: Case, tag: str) -> Iterator[SourceElement]:
-    """Yield the links or joints of all models in the text, in document order."""
+    """Yield the links or joints of all models in the text, in document order; a ``<state>`` has none."""
     for element in case.source.root.walk():
-        if element.tag == tag and element.parent is not None and element.parent.tag == "model":
+        around = element.parent
+        if element.tag == tag and around is not None and around.tag == "model" and not _is_state(around):
             yield element
+
+
+def _is_state(model: SourceElement) -> bool:
+    around: SourceElement | None = model
+    while around is not None and around.tag != "state":
+        around = around.parent
+    return around is not None
 
 
 def _found(element: SourceElement, at: SourceElement, message: str) -> Detection:
@@ -628,3 +636,40 @@ def _renamed(text: str, name: str, new: str) -> str:
     """Return the text of an element in which poses and axes are stated in a frame with another name."""
     stated = rf"""\b(relative_to|expressed_in)\s*=\s*(["'])({re.escape(escape(name))})\2"""
     return re.sub(stated, lambda found: f"{found[1]}={quoteattr(new)}", text)
+
+
+class ScriptWithoutUriOfSdf(EditingRule):
+    """DX714 script-without-uri-of-sdf: A material of SDF has a script without a URI, so Drake refuses the
+    file.
+
+    ``<script><name>Gazebo/Red</name></script>`` names a material of Gazebo. The format requires a ``<uri>``
+    in it, which names the file of the material.
+
+    - Drake 1.51 refuses the file: "A <script> element is missing a child <uri> element".
+    - PyBullet 3.2.7 (``loadSDF``) loads the file.
+
+    What to do: write the URI, which is ``file://media/materials/scripts/gazebo.material`` for the materials
+    of Gazebo. ``dynx doctor --fix`` writes it. Only the colour of a visual depends on the script.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    advice = "Write the <uri> of the script."
+    engines = measured_on("drake")
+    changed = "wrote the URI of Gazebo's materials into scripts without a URI"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield scripts of materials without a URI, in document order."""
+        uri = "<uri>file://media/materials/scripts/gazebo.material</uri>"
+        for link in _parts(case, "link"):
+            for script in (each for each in link.walk() if each.tag == "script"):
+                if script.parent is None or script.parent.tag != "material":
+                    continue
+                named = script.first("uri")
+                if named is None:
+                    edit = case.source.insertion(script, uri)
+                elif case.source.text_in(named):
+                    continue
+                else:
+                    edit = case.source.replacement(named, uri)
+                yield Correction(_found(link, script, "the script has no URI"), (edit,))
