@@ -241,7 +241,10 @@ def _radius(disk: Disk, limit: Any, x: Sequence[Any] | Array) -> Any:
 
 def disk_share(radius: Any, wanted: Sequence[Any]) -> Any:
     """Return the factor by which a vector is shortened to at most `radius`, for any scalar."""
-    return minimum(1.0, radius / (norm(wanted) + TINY))
+    if len(wanted) == 1:
+        return minimum(1.0, radius / (abs(wanted[0]) + TINY))
+    x, y = wanted
+    return minimum(1.0, radius / _root(x * x + y * y + TINY))
 
 
 def norm(vector: Sequence[Any]) -> Any:

@@ -19,6 +19,7 @@ import numpy as np
 
 from dynx.errors import TraceError
 from dynx.simd.cache import load_code, program_recipe
+from dynx.simd.elementary import DECLARED_ROOT_ESTIMATE, ROOT_ESTIMATE, quotient_by_root
 from dynx.simd.emit import (
     DECLARED_PREFETCH,
     ENTRY,
@@ -336,12 +337,15 @@ class _PartBody(SegmentBody):
         *,
         inputs: Sequence[tuple[bool, int]],
         outputs: Sequence[tuple[bool, int]],
+        is_step: bool,
         at_once: bool,
     ) -> None:
         """`inputs` and `outputs` have for each port whether it is in memory, and the number of its array or
-        its first slot. Results in memory are written `at_once`, unless they replace values that are read."""
+        its first slot. Results in memory are written `at_once`, unless they replace values that are read.
+        Quotients by roots are correct to 2 ulp in a step."""
         super().__init__(program, target, settings, segment, slots, number)
         self._sources, self._targets = inputs, outputs
+        self._estimates_roots = is_step and target.estimates_roots and target.lanes == settings.lanes
         places = zip((*program.inputs, *program.outputs), (*inputs, *outputs), strict=True)
         self._rows = [Rows(self._write, port.size, partial(self._pointers, at)) for port, (_, at) in places]
         self._ages: dict[int, int] = {}
@@ -370,6 +374,16 @@ class _PartBody(SegmentBody):
             for column, node in zip(columns, nodes, strict=True):
                 if node not in self._results or self._program.nodes[node].op in LEAVES:
                     self._keep(self._value(node), place + column)
+
+    def _compute(self, index: int) -> None:
+        nodes = self._program.nodes
+        node = nodes[index]
+        if self._estimates_roots and node.op == "div" and nodes[node.args[1]].op == "sqrt":
+            (radicand,) = nodes[node.args[1]].args
+            a, x = self._value(node.args[0]), self._value(radicand)
+            self._set(index, quotient_by_root(self._write, a, x))
+        else:
+            super()._compute(index)
 
     def _set(self, index: int, name: str) -> None:
         super()._set(index, name)
@@ -422,6 +436,7 @@ def emit_repetition(repetition: Repetition, target: Processor, settings: Setting
                 first + k,
                 inputs=sources,
                 outputs=targets,
+                is_step=is_step,
                 at_once=part < last and not is_step,
             ).text("")
             for k, segment in enumerate(segments)
@@ -443,7 +458,10 @@ def _places(
 
 def _module(functions: Sequence[str], target: Processor, settings: Settings) -> str:
     parts = [f'target triple = "{target.triple}"', *functions, *replacements(functions, settings.lanes)]
-    return "\n".join([*parts, *declarations(settings.lanes), DECLARED_PREFETCH]) + "\n"
+    parts += [*declarations(settings.lanes), DECLARED_PREFETCH]
+    if any(ROOT_ESTIMATE in function for function in functions):
+        parts.append(DECLARED_ROOT_ESTIMATE)
+    return "\n".join(parts) + "\n"
 
 
 def _loop(

@@ -31,6 +31,11 @@ class Processor:
         return 4 if "+avx" in features else 2
 
     @property
+    def estimates_roots(self) -> bool:
+        """True if an instruction estimates the reciprocal square roots of the widest vector of doubles."""
+        return self.lanes == 8
+
+    @property
     def short_addresses(self) -> bool:
         """True if code may address its constants by 32-bit offsets, which makes it a tenth smaller.
 

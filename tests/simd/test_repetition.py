@@ -191,3 +191,24 @@ def test_misuse_is_refused() -> None:
     ):
         with pytest.raises(TraceError, match=message):
             trace_repetition(function, {"x": (1,)})
+
+
+def test_quotients_by_roots_in_a_step_are_correct_to_the_last_places() -> None:
+    """Some processors estimate them, and Newton's method ends what the estimate began."""
+
+    def function(x: Array, a: Array, repeat: Any) -> Numbers:
+        def step(state: Numbers) -> Numbers:
+            return {"x": state["x"], "y": a / sqrt(state["x"]), "goes_on": np.zeros(1)}
+
+        return {"y": repeat(step, {"x": x, "y": a, "goes_on": np.ones(1)}, 1)["y"]}
+
+    kernel = load_repetition(trace_repetition(function, {"x": (1,), "a": (1,)}))
+    rng = np.random.default_rng(0)
+    x = 10.0 ** rng.uniform(-300.0, 300.0, (4096, 1))
+    a, found = rng.uniform(-1.0, 1.0, x.shape), np.empty(x.shape)
+    kernel([x, a], [found])
+    np.testing.assert_allclose(found, a / np.sqrt(x), rtol=4.0 * np.finfo(float).eps)
+    # A root that vanishes divides as the tiny number that is added to it.
+    least = np.full((8, 1), 1e-300)
+    kernel([least, np.ones((8, 1))], [found[:8]])
+    np.testing.assert_allclose(found[:8], 1e150, rtol=1e-15)
