@@ -494,8 +494,15 @@ class LoadedDrake(LoadedRobot):
         joints = [
             plant.get_joint(index) for instance in instances for index in plant.GetJointIndices(instance)
         ]
-        named = {self._scoped(joint): joint for joint in joints}
-        return {name: joint for name, joint in named.items() if name in known}
+        named: dict[str, Any] = {}
+        for joint in joints:
+            # Drake puts a joint into the nested model of its child, wherever the file states it.
+            scopes = self._scoped(joint).split("::")
+            around = ["::".join([*scopes[:depth], scopes[-1]]) for depth in range(len(scopes) - 1, -1, -1)]
+            name = next((each for each in around if each in known and each not in named), None)
+            if name is not None:
+                named[name] = joint
+        return named
 
     def _scoped(self, part: Any) -> str:
         """Return the name of a body or joint as dynx has it: below that of the nested model of SDF."""

@@ -643,7 +643,7 @@ class ScriptWithoutUriOfSdf(EditingRule):
     file.
 
     ``<script><name>Gazebo/Red</name></script>`` names a material of Gazebo. The format requires a ``<uri>``
-    in it, which names the file of the material.
+    in it, which names the file of the material. ``__default__`` counts as no URI.
 
     - Drake 1.51 refuses the file: "A <script> element is missing a child <uri> element".
     - PyBullet 3.2.7 (``loadSDF``) loads the file.
@@ -668,7 +668,7 @@ class ScriptWithoutUriOfSdf(EditingRule):
                 named = script.first("uri")
                 if named is None:
                     edit = case.source.insertion(script, uri)
-                elif case.source.text_in(named):
+                elif case.source.text_in(named) not in ("", "__default__"):
                     continue
                 else:
                     edit = case.source.replacement(named, uri)

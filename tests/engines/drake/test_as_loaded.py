@@ -171,6 +171,22 @@ def test_a_rotor_inertia_is_in_the_mass_matrix() -> None:
     assert held.effort == 9.0
 
 
+def test_a_joint_to_a_nested_model_is_that_of_the_file(tmp_path: Path) -> None:
+    """Drake names such a joint as if the nested model stated it."""
+    mass = "<inertial><mass>2</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>"
+    path = tmp_path / "robot.sdf"
+    path.write_text(
+        f"""<sdf version="1.9"><model name="arm"><link name="upper">{mass}</link>
+        <model name="camera"><pose>0.5 0 0 0 0 0</pose><link name="lens">{mass}</link></model>
+        <joint name="tilt" type="revolute"><parent>upper</parent><child>camera::lens</child>
+        <axis><xyz>0 1 0</xyz></axis></joint></model></sdf>"""
+    )
+    model = dynx.load(path)
+    with LoadedDrake(path, model) as robot:
+        assert model.joint_names == ("tilt",)
+        assert_alike(robot, model)
+
+
 def test_the_call_that_adds_models_runs_as_it_is_shown() -> None:
     path = find_trap("DX711")
     create = LoadedDrake.load_call(True, form="sdf").splitlines()[0]
