@@ -42,6 +42,7 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
     "DX618": {"DX619": "the base that is fixed floats in PyBullet"},
     "DX708": {"DX711": "what is included is named by a model"},
     "DX711": {"DX708": "a file is included"},
+    "DX715": {"DX701": "a link of a nested model is not looked at for a box"},
     "DX712": {"DX701": "moments of their own are those of no box"},
 }
 

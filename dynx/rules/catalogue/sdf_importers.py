@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 from xml.sax.saxutils import escape, quoteattr
 
+from dynx.errors import shown
 from dynx.model.document_format import Format
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.model.package_search import MODEL_MANIFEST
@@ -673,3 +674,35 @@ class ScriptWithoutUriOfSdf(EditingRule):
                 else:
                     edit = case.source.replacement(named, uri)
                 yield Correction(_found(link, script, "the script has no URI"), (edit,))
+
+
+class NestedModelOfSdf(Rule):
+    """DX715 nested-model-of-sdf: A model of SDF contains another model, which PyBullet ignores.
+
+    ``<model>`` within ``<model>`` has links and joints of its own, named ``MODEL::LINK`` outside it.
+
+    - Drake 1.51 reads the nested model.
+    - PyBullet 3.2.7 (``loadSDF``) ignores the nested model without a message. If a joint outside it has one
+      of its links as parent or child, PyBullet refuses the file: "Cannot find child link for a joint".
+
+    The robot lacks the links and joints of the nested model.
+
+    What to do: write a file without nested models (``dynx convert --to urdf``). ``dynx doctor --fix`` does
+    not change the file, because links would have other names.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    stated = True
+    stated_refusal = True
+    advice = "Write a file without nested models (dynx convert --to urdf)."
+    engines = measured_on("pybullet")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the models within models."""
+        for element in case.source.root.walk():
+            around = element.parent
+            nested = element.tag == "model" and around is not None and around.tag == "model"
+            if nested and not _is_state(element):
+                name = shown(element.attributes.get("name", ""))
+                yield Detection(None, None, element.line, f"the model contains the model {name}")
