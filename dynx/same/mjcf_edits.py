@@ -44,7 +44,7 @@ _OTHER_ORIENTATIONS = ("axisangle", "euler", "xyaxes", "zaxis")
 
 
 @dataclass(frozen=True)
-class _Chain:
+class _JointsOfBody:
     """The joints of a body in the pose of the file: the pose (4, 4) of the body in its parent, and the point
     and the axis of each joint, both (3,), in the body."""
 
@@ -108,7 +108,7 @@ class MjcfEdits:
                 what = f"joint {joint.name}" if joint.moves else f"body {joint.child}"
                 raise NotMendedError(f"the place of {what} does not follow from one <body> alone")
 
-    def _in_file(self, joints: Sequence[Joint]) -> _Chain:
+    def _in_file(self, joints: Sequence[Joint]) -> _JointsOfBody:
         """Return the joints of a body as the file states them: at the positions in its pose."""
         initial = self._model.stated_initial
         references = {} if initial is None else dict(initial.positions)
@@ -128,10 +128,10 @@ class MjcfEdits:
                 points.append(back[:3, 3])
                 axes.append(back[:3, :3] @ joint.axis)
             T_child_body = T @ T_child_body
-        return _Chain(T_child_body, tuple(points[::-1]), tuple(axes[::-1]))
+        return _JointsOfBody(T_child_body, tuple(points[::-1]), tuple(axes[::-1]))
 
     def _chain(
-        self, name: str, body: SourceElement, joints: Sequence[SourceElement], old: _Chain, new: _Chain
+        self, name: str, body: SourceElement, joints: Sequence[SourceElement], old: _JointsOfBody, new: _JointsOfBody
     ) -> Iterator[Edit]:
         """Yield the edits of a body and its joints; what stands in a <frame> is written in the frame."""
         if not _are_near(old.T_parent_body, new.T_parent_body):
