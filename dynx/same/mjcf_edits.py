@@ -131,7 +131,12 @@ class MjcfEdits:
         return _JointsOfBody(T_child_body, tuple(points[::-1]), tuple(axes[::-1]))
 
     def _chain(
-        self, name: str, body: SourceElement, joints: Sequence[SourceElement], old: _JointsOfBody, new: _JointsOfBody
+        self,
+        name: str,
+        body: SourceElement,
+        joints: Sequence[SourceElement],
+        old: _JointsOfBody,
+        new: _JointsOfBody,
     ) -> Iterator[Edit]:
         """Yield the edits of a body and its joints; what stands in a <frame> is written in the frame."""
         if not _are_near(old.T_parent_body, new.T_parent_body):
