@@ -197,7 +197,7 @@ def test_a_list_of_wrong_objects_is_not_said_to_be_too_many() -> None:
 
 OTHER_FILES = {
     "a.sdf": ("<world name='w'/>", "this file is a part of SDF, whose root is <sdf>"),
-    "b.xml": ('<gazebo version="1.0"/>', "dynx reads versions 1.4 to 1.12"),
+    "b.xml": ('<gazebo version="1.0"/>', "dynx reads 1.4 to 1.12"),
     "empty.sdf": ("", "wanted <sdf version=...>"),
     "a.xml": ("<model><link/></model>", "the root element is <model>; wanted <robot>"),
     "a.dae": ("<COLLADA/>", "this file is a mesh; dynx.world.mesh"),

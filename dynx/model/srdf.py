@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, escaped, shown
 from dynx.files.reading import printable, read_file
 from dynx.model.elements import NamedConfiguration, Note
@@ -22,6 +23,7 @@ from dynx.model.xml.reading import Element, read_xml
 from dynx.model.xml.values import Reading
 
 
+@checks_types
 def with_group_states(model: Model, srdf: StrPath | bytes) -> Model:
     """Return a robot with the group states of SRDF as named configurations; see `Model.with_group_states`."""
     if isinstance(srdf, bytes) or (isinstance(srdf, str) and srdf.lstrip().startswith("<")):

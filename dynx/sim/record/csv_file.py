@@ -13,7 +13,7 @@ The first line names the columns, in this order; ``c`` stands for each coordinat
 | `a:c`, `tau:c` | acceleration and torque in the step that starts at this time | rad/s^2 or m/s^2; N m or N |
 | `saturated:c` | 1 if the motor was at its limit in the step that starts at this time, otherwise 0 | |
 | `contact:NAME:x`, `:y`, `:z` | contact force on the body or link NAME in that step, in world axes | N |
-| `sensor:NAME:...` | sample of the sensor NAME; empty if it took none at this time | as in the sensor |
+| `sensor:NAME:...` | sample of the sensor NAME; empty without a sample at this time | as in the sensor |
 
 Coordinates have the names of their joints. A floating base comes first: `x y z qx qy qz qw` in positions (of
 the base frame in the world, quaternion xyzw) and `vx vy vz wx wy wz` in rates (in the base frame). No step

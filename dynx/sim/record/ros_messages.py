@@ -21,7 +21,7 @@ joints: the description has a hinge in the place of each, and the metadata list 
 | `/ball_joints/accelerations` | trajectory_msgs/MultiDOFJointTrajectory | accelerations; one element |
 | `/ball_joints/saturated` | sensor_msgs/MultiDOFJointState | `torque` is 1 at a limit, otherwise 0 |
 | `/ball_joints/reference` | sensor_msgs/MultiDOFJointState | reference attitudes and angular velocities |
-| `/ball_joints/reference_accelerations` | trajectory_msgs/MultiDOFJointTrajectory | those of the reference |
+| `/ball_joints/reference_accelerations` | trajectory_msgs/MultiDOFJointTrajectory | of the reference |
 | `/ball_joints/error` | sensor_msgs/MultiDOFJointState | `twist` has the rotation [rad] to the reference |
 
 A floating base adds these topics. Its pose is in the frame ``world`` (``map`` if the root link is called
