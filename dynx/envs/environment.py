@@ -98,7 +98,9 @@ class TaskEnvironment(Env[Any, Any]):
         if drawn is not None:
             try:
                 motion = self._episodes.vary(drawn)
-                self._variation = Variation(drawn, motion, task.observation_space, task.action_space)
+                self._variation = Variation(
+                    drawn, motion, task.observation_space, task.action_space, task.control_dt
+                )
             except BaseException:
                 self.close()
                 raise
@@ -168,6 +170,8 @@ class TaskEnvironment(Env[Any, Any]):
         given = checked_action(self.action_space, action)
         if self._variation is not None:
             given = self._acting(given)
+            if self._variation.pushes is not None:
+                episodes.push(self._variation.accelerations()[0])
         truncated = False
         try:
             outcome = episodes.step(given)

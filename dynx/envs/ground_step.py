@@ -263,12 +263,15 @@ class GroundStep(TaskStep):
         return self._contacts.robot.limited
 
     def robot_text(self, *, stops: bool = False) -> StepText:
-        """Return the text of a step of the robot: from ``state``, ``action`` and drawn ``parameters`` to the
-        next ``state``, in which only the memory of the task is the same. Without `stops` the largest distance
-        ``beyond`` one [rad or m] is another output: where there is none, stops change nothing."""
+        """Return the text of a step of the robot: from ``state``, ``action``, drawn ``parameters`` and a
+        ``push`` to the next ``state``, in which only the memory of the task is the same. Without `stops` the
+        largest distance ``beyond`` one [rad or m] is another output: where there is none, stops change
+        nothing."""
         sizes = {"state": self.layout.size, "action": self.actions}
         if self._ground.drawn_parameters:
             sizes["parameters"] = len(self._ground.drawn_parameters)
+        if self._ground.pushed:
+            sizes["push"] = 2
 
         def function(repeat: Any, **inputs: Array) -> dict[str, Array]:
             after = self._robot_step(repeat, inputs, stops=stops)
@@ -300,8 +303,14 @@ class GroundStep(TaskStep):
         shapes = tuple(
             each._replace(friction=varied.friction(each, drawn)) for each in contacts.touching.shapes
         )
+        mechanism = varied.mechanism(self._mechanism, drawn, masses=self._draws_masses)
+        regrouped = self._regrouped
+        if varied.pushed:
+            mechanism = varied.pushed_mechanism(mechanism, inputs["push"])
+            if regrouped is not None:
+                regrouped = varied.pushed_mechanism(regrouped, inputs["push"])
         result = contact_step(
-            varied.mechanism(self._mechanism, drawn, masses=self._draws_masses),
+            mechanism,
             joints,
             replace(contacts.touching, shapes=shapes),
             SWEEPS,
@@ -311,7 +320,7 @@ class GroundStep(TaskStep):
             target,
             impulses[kept],
             repeat,
-            regrouped=self._regrouped,
+            regrouped=regrouped,
         )
         largest = maximum(result["residual"][0], residual[0])
         found = np.zeros(contacts.impulses, dtype=object)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dynx.argument_types import checks_types
 from dynx.envs.library import Space, spaces
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
-from dynx.model.numbers import MAX_MAGNITUDE, is_real
+from dynx.model.numbers import MAX_MAGNITUDE, is_real, positive_seconds
 from dynx.spatial.scalar import Floats
 from dynx.steppers.random import BLOCK_STEPS, Purpose, StepNumbers, Streams
 
@@ -108,6 +108,11 @@ OF_ALL_PARTS = ("gain_scale", "motor_strength", "gravity_scale", "delay")
 """Fields with one distribution, which no part has alone."""
 
 PAYLOAD_FIELDS = ("frame", "mass", "center")
+PUSH_FIELDS = ("speed", "interval", "duration")
+PUSH_DURATION = 0.1
+"""Duration of a push [s] unless another is given."""
+MAX_INTERVAL = 2.0**40
+"""Largest number of control steps in an interval of pushes; more are as many, since no episode is as long."""
 AXES = ("x", "y", "z")
 
 
@@ -142,6 +147,11 @@ class Randomization:
     """Factor on the torques of motors and on their limits; in worlds only."""
     gravity_scale: Range | None = None
     """Factor on gravity; in worlds only."""
+    pushes: Mapping[str, Any] | None = None
+    """Pushes of the robots to horizontal directions at random: ``{"speed": (0.0, 1.0), "interval": 5.0}``. In
+    each ``interval`` [s] of an episode a force that is proportional to its mass acts on every link. It begins
+    at a random time and acts for the ``duration`` [s], by default 0.1. A robot on which nothing else acts
+    gets the ``speed`` [m/s], which each push draws anew. In worlds only."""
     delay: Range | None = None
     """Time from an action until it acts [s]."""
     observation_noise: Range | Mapping[int | str, Range] | None = None
@@ -185,6 +195,8 @@ class Randomization:
             return {}
         if name == "payload":
             return _payload(given)
+        if name == "pushes":
+            return {"speed": _push_speed(given)}
         valid = POSITIVE if name == "mass_scale" else NOT_NEGATIVE
         if is_distribution(given) or name in OF_ALL_PARTS:
             return {None: read_distribution(name, given, valid)}
@@ -199,6 +211,24 @@ class Randomization:
     def payload_frame(self) -> str | None:
         """Frame to which the payload is fixed."""
         return None if self.payload is None else str(self.payload["frame"])
+
+
+def _push_speed(given: Mapping[str, Any]) -> Distribution:
+    """Return the distribution of the speed of pushes. Raises ArgumentError and UnknownNameError for pushes
+    that are not valid."""
+    for name in given:
+        if name not in PUSH_FIELDS:
+            raise UnknownNameError(f"pushes has no {shown(name)}{nearest(name, PUSH_FIELDS)}")
+    for name in PUSH_FIELDS[:2]:
+        if name not in given:
+            raise ArgumentError(f"pushes has no {name}: {shown(given)}")
+    interval = positive_seconds("the interval of pushes", given["interval"])
+    duration = positive_seconds("the duration of pushes", given.get("duration", PUSH_DURATION))
+    if duration > interval:
+        raise ArgumentError(
+            f"pushes last {duration:g} s; wanted at most the interval of {interval:g} s, which has one push"
+        )
+    return read_distribution("the speed of pushes", given["speed"])
 
 
 def _payload(given: Any) -> dict[str | None, Distribution]:
@@ -298,11 +328,60 @@ def first_seed(seed: int | None, rng: np.random.Generator) -> int:
     return int(rng.integers(2**63)) if seed is None or seed < 0 else seed
 
 
+class Pushes:
+    """Pushes of robots in `count` environments, drawn a block of intervals at a time."""
+
+    def __init__(self, pushes: Mapping[str, Any], control_dt: float, count: int) -> None:
+        """`pushes` are those of a `Randomization`; interval and duration are rounded to control steps."""
+        self._speed = _push_speed(pushes)
+        self._interval = max(1, round(min(pushes["interval"] / control_dt, MAX_INTERVAL)))
+        duration = pushes.get("duration", PUSH_DURATION) / control_dt
+        self._duration = max(1, round(min(duration, self._interval)))
+        self._control_dt = control_dt
+        self._begin = np.zeros((count, BLOCK_STEPS), dtype=np.int64)
+        self._drawn = np.zeros((count, BLOCK_STEPS, 2))
+        self._blocks = np.full((count, 2), -1)
+
+    def forget(self) -> None:
+        """Draw anew, after the seeds have changed."""
+        self._blocks[:] = -1
+
+    def at(
+        self,
+        streams: Streams,
+        rows: NDArray[np.intp],
+        episodes: NDArray[np.int64],
+        steps: NDArray[np.int64],
+    ) -> Floats:
+        """Return the accelerations (n, 2) [m/s^2] along x and y of the world, of environments `rows` (n,) in
+        `steps` (n,) of their `episodes`."""
+        intervals, step = np.divmod(steps, self._interval)
+        blocks = np.column_stack([episodes, intervals // BLOCK_STEPS])
+        for k in np.flatnonzero((self._blocks[rows] != blocks).any(axis=1)).tolist():
+            self._draw(streams, int(rows[k]), *blocks[k].tolist())
+        self._blocks[rows] = blocks
+        place = intervals % BLOCK_STEPS
+        begin = self._begin[rows, place]
+        acts = (begin <= step) & (step < begin + self._duration)
+        return np.where(acts[:, None], self._drawn[rows, place], 0.0)
+
+    def _draw(self, streams: Streams, row: int, episode: int, block: int) -> None:
+        random, speed = np.empty((BLOCK_STEPS, 2)), np.empty(BLOCK_STEPS)
+        streams.uniform(Purpose.PUSH, episode, block, random, row)
+        draw = streams.normal if self._speed.kind == NORMAL else streams.uniform
+        draw(Purpose.PUSH_SPEED, episode, block, speed, row)
+        self._begin[row] = np.floor(random[:, 0] * (self._interval - self._duration + 1))
+        angle = 2.0 * np.pi * random[:, 1]
+        acceleration = self._speed.numbers(speed) / (self._duration * self._control_dt)
+        self._drawn[row] = acceleration[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
 class Variation:
-    """Drawn values and noise of `count` environments.
+    """Drawn values, noise and pushes of `count` environments.
 
     Environment k has the seed of the first plus k. Its values depend on that seed, the number of the episode
-    since the seed was set, and the name of the parameter; its noise also on the step of the episode.
+    since the seed was set, and the name of the parameter; its noise and pushes also on the step of the
+    episode.
     """
 
     def __init__(
@@ -311,10 +390,11 @@ class Variation:
         motion: Sequence[Parameter],
         observation_space: Space[Any],
         action_space: Space[Any],
+        control_dt: float,
         count: int = 1,
     ) -> None:
-        """`motion` are the parameters other than noise. Raises UnsupportedFeatureError and ArgumentError for
-        noise that the spaces cannot have."""
+        """`motion` are the parameters other than noise and pushes. Raises UnsupportedFeatureError and
+        ArgumentError for noise that the spaces cannot have."""
         on_observations = noise_parameters(randomization, "observation_noise", observation_space)
         on_actions = noise_parameters(randomization, "action_noise", action_space)
         first, second = len(motion), len(motion) + len(on_observations)
@@ -323,6 +403,8 @@ class Variation:
             Purpose.OBSERVATION, observation_space, on_observations, first, count
         )
         self.action_noise = make_noise(Purpose.ACTION, action_space, on_actions, second, count)
+        pushes = randomization.pushes
+        self.pushes = None if pushes is None else Pushes(pushes, control_dt, count)
         self.motion_size = len(motion)
         self.values: Floats = np.zeros((count, len(self._draws.names)))
         """Values (count, k) of the present episodes; the first `motion_size` are those of the motion."""
@@ -344,6 +426,8 @@ class Variation:
         for noise in (self.observation_noise, self.action_noise):
             if noise is not None:
                 noise.numbers.forget()
+        if self.pushes is not None:
+            self.pushes.forget()
 
     def start(self, rows: NDArray[np.intp] | None = None) -> None:
         """Draw the values of the next episodes of some environments, by default of all."""
@@ -378,6 +462,12 @@ class Variation:
         if self.action_noise is None:
             return np.zeros((len(self.values), 0))
         return self._numbers(self.action_noise, self._everywhere)
+
+    def accelerations(self) -> Floats:
+        """Return the accelerations (count, 2) [m/s^2] along x and y by pushes during the next steps."""
+        if self.pushes is None:
+            return np.zeros((len(self.values), 2))
+        return self.pushes.at(self._streams, self._everywhere, self._episodes, self._steps)
 
     def _numbers(self, noise: SpaceNoise, rows: NDArray[np.intp]) -> Floats:
         drawn = noise.numbers.at(self._streams, rows, self._episodes[rows], self._steps[rows])

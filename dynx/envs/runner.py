@@ -41,6 +41,7 @@ from dynx.model.elements import JointCoefficients
 from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.rbd.joint_friction import FrictionLaw
 from dynx.spatial.scalar import Array, Floats
+from dynx.steppers.forces import ExternalForce
 from dynx.steppers.state import RobotState, WorldState
 
 if TYPE_CHECKING:
@@ -294,6 +295,10 @@ class GroundEpisodes(CompiledEpisodes):
         self._open_lane()
         return self._varied.drawn_parameters
 
+    def push(self, acceleration: Floats) -> None:
+        """Push the robot during the next step, with an acceleration (2,) [m/s^2]."""
+        self._lanes.arrays["push"][0] = acceleration
+
     @cached_property
     def _world(self) -> World:
         """A world that is only drawn."""
@@ -423,6 +428,7 @@ class WorldEpisodes(Episodes):
         self._varied: VariedScene | None = None
         self._values: NDArray[np.float64] = np.zeros(0)
         self._waiting: deque[Any] = deque()
+        self._push: Floats | None = None
         self._world = self._open(task.scene())
         self._start: Snapshot | None = None
         self._viewer: Any = None
@@ -453,6 +459,10 @@ class WorldEpisodes(Episodes):
         """Give the scene of the next episode the values (k,) of the parameters that `vary` returned."""
         self._values = values
 
+    def push(self, acceleration: Floats) -> None:
+        """Push the robots during the next step, with an acceleration (2,) [m/s^2]."""
+        self._push = acceleration if acceleration.any() else None
+
     def start(self, rng: np.random.Generator, options: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
         task = self._task
         task.require_start_options(options)
@@ -481,7 +491,12 @@ class WorldEpisodes(Episodes):
             self._waiting.append(action)
             action = acting
         loads = task.loads(episode, action)
-        self._world.step(**(loads if self._varied is None else self._varied.loads(loads, self._values)))
+        if self._varied is not None:
+            loads = self._varied.loads(loads, self._values)
+        if self._push is not None:
+            pushes = pushing_forces(self._world.scene, self._push)
+            loads = {**loads, "forces": [*loads.get("forces", ()), *pushes]}
+        self._world.step(**loads)
         task.settle(episode, action)
         self._action = action
         terminated = bool(task.terminated(episode))
@@ -540,6 +555,21 @@ class WorldEpisodes(Episodes):
             self._start = self._world.save()
         else:
             self._world.restore(self._start)
+
+
+def pushing_forces(scene: Scene, acceleration: Floats) -> list[ExternalForce]:
+    """Return the forces that accelerate every link of the robots of a scene by (2,) [m/s^2] along x and y."""
+    ax, ay = acceleration.tolist()
+    return [
+        ExternalForce(
+            f"{robot.name}/{link.name}",
+            (link.inertial.mass * ax, link.inertial.mass * ay, 0.0, 0.0, 0.0, 0.0),
+            point=link.inertial.origin.xyz,
+        )
+        for robot in scene.robots
+        for link in robot.model.links
+        if link.inertial is not None and link.inertial.mass > 0.0
+    ]
 
 
 def draw_robot(task: RobotTask, state: State, width: int, height: int) -> NDArray[np.uint8]:

@@ -165,7 +165,7 @@ class Episodes(ABC):
 
     def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
         """Return the parameters of the motion that later episodes draw: those of `randomization` that are
-        neither noise of observations nor of actions.
+        neither noise of observations nor of actions, nor pushes.
 
         Raises UnsupportedFeatureError by default, UnknownNameError for a part that the task does not have.
         """
@@ -174,6 +174,13 @@ class Episodes(ABC):
     def set_parameters(self, values: NDArray[np.float64]) -> None:
         """Set the values (k,) of the parameters that `vary` returned, before the next episode starts."""
         raise UnsupportedFeatureError(f"{type(self).__name__} has no parameters that episodes can draw")
+
+    def push(self, acceleration: NDArray[np.float64]) -> None:
+        """Push the robots during the next step: a force that is proportional to its mass acts on every link.
+
+        `acceleration` (2,) [m/s^2] is that of a robot on which nothing else acts, along x and y of the world.
+        """
+        raise UnsupportedFeatureError(f"{type(self).__name__} has no pushes")
 
     @abstractmethod
     def start(self, rng: np.random.Generator, options: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:

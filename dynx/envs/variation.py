@@ -105,7 +105,7 @@ class VariedRobot:
                 f"{type(task).__name__} has no contacts, so friction_scale changes nothing; the friction of "
                 "its joints is joint_friction"
             )
-        for field in (*MOTOR_FIELDS, "gravity_scale"):
+        for field in (*MOTOR_FIELDS, "gravity_scale", "pushes"):
             if getattr(randomization, field) is not None:
                 raise UnsupportedFeatureError(
                     f"{type(task).__name__} computes its torques itself: tasks in worlds have {field}"
@@ -180,6 +180,8 @@ class VariedGround(VariedRobot):
     ) -> None:
         """`touching` are the shapes of the robot that may touch the ground."""
         self._touching = touching
+        self.pushed = randomization is not None and randomization.pushes is not None
+        """True if episodes have pushes."""
         super().__init__(task, randomization, joints)
         self.stops = False
 
@@ -226,6 +228,11 @@ class VariedGround(VariedRobot):
         if self.draws("gravity_scale"):
             mechanism = replace(mechanism, gravity=mechanism.gravity * self._factor("gravity_scale", drawn))
         return mechanism
+
+    def pushed_mechanism(self, mechanism: Mechanism, push: Array) -> Mechanism:
+        """Return the mechanism while its links are pushed with an acceleration (2,) along x and y: pushes are
+        proportional to masses, as gravity is."""
+        return replace(mechanism, gravity=mechanism.gravity + np.array([*push, 0.0]))
 
     def _factor(self, field: str, drawn: Array) -> Any:
         column = self._columns(field).get(None)

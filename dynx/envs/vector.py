@@ -143,7 +143,9 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         self._threads = checked_threads(threads)
         if drawn is not None:
             spaces_of_one = task.observation_space, task.action_space
-            self._variation = Variation(drawn, varied.drawn_parameters, *spaces_of_one, count=n)
+            self._variation = Variation(
+                drawn, varied.drawn_parameters, *spaces_of_one, task.control_dt, count=n
+            )
         self._layout = self._task_step.layout
         self._seeded_by: np.random.Generator | None = None
         self._copy = copy
@@ -269,6 +271,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         ):
             actions = checked_actions(self._kinds, self._actions.shape, actions)
         self._actions[...] = self._noisy(actions)
+        if self._variation is not None and self._variation.pushes is not None:
+            self._arrays["push"][: self.num_envs] = self._variation.accelerations()
         self._lanes.evaluate()
         flags = self._flags
         largest = flags.max()

@@ -28,6 +28,8 @@ class Purpose(IntEnum):
     OBSERVATION = 3
     ACTION = 4
     SENSOR = 5
+    PUSH = 6
+    PUSH_SPEED = 7
 
 
 class Streams:

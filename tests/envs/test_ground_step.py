@@ -29,6 +29,7 @@ DRAWN = {
     "gain_scale": (0.8, 1.2),
     "motor_strength": (0.7, 1.1),
     "gravity_scale": (0.9, 1.1),
+    "pushes": {"speed": (0.5, 1.0), "interval": 0.2, "duration": 0.06},
     "observation_noise": 0.01,
     "action_noise": 0.02,
 }
@@ -49,8 +50,13 @@ def vector(task: GroundTask, count: int, **options: Any) -> Iterator[RobotVector
 
 @pytest.mark.parametrize(
     ("task", "randomize"),
-    [(Walk(contacts="feet"), None), (Stand(contacts="feet"), None), (Walk(contacts="feet"), DRAWN)],
-    ids=["Walk", "Stand", "drawn"],
+    [
+        (Walk(contacts="feet"), None),
+        (Stand(contacts="feet"), None),
+        (Walk(contacts="feet"), DRAWN),
+        (Stand(contacts="feet"), {"pushes": DRAWN["pushes"]}),
+    ],
+    ids=["Walk", "Stand", "drawn", "pushed"],
 )
 def test_each_lane_is_the_single_environment(task: GroundTask, randomize: Mapping[str, Any] | None) -> None:
     """Bit for bit, with episodes that end and start anew by a mask."""
@@ -174,10 +180,14 @@ def test_the_kernel_moves_as_the_world_does_in_small_steps() -> None:
 
 @pytest.mark.parametrize("kind", [Walk, Fine])
 def test_motors_of_kernels_and_worlds_have_one_law(kind: type[Walk]) -> None:
-    """In free flight, where no sweeps end at a tolerance."""
+    """In free flight, where no sweeps end at a tolerance; pushes have one law too."""
     task = kind(contacts="feet")
     found: list[list[Floats]] = [[], []]
-    with TaskEnvironment(task, "dynx") as env, TaskEnvironment(task, "dynx") as other:
+    drawn = {"pushes": {"speed": 1.0, "interval": 0.02, "duration": 0.02}}
+    with (
+        TaskEnvironment(task, "dynx", randomize=drawn) as env,
+        TaskEnvironment(task, "dynx", randomize=drawn) as other,
+    ):
         other.episodes.close()
         other._episodes = in_world = WorldEpisodes(task, "dynx")
         in_kernel = env.episodes

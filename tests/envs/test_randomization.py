@@ -12,9 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynx.backends import installed_backends
+from dynx.backends.registry import backend
 from dynx.envs import Randomization
 from dynx.envs.environment import TaskEnvironment
-from dynx.envs.randomization import Draws, parameters_of, read_distribution
+from dynx.envs.randomization import Draws, Pushes, parameters_of, read_distribution
+from dynx.envs.runner import WorldEpisodes
 from dynx.envs.task import State
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.envs.tasks.pendulum import Pendulum
@@ -24,7 +26,9 @@ from dynx.envs.tasks.stand import Stand
 from dynx.envs.variation import VariedRobot
 from dynx.envs.vector import RobotVectorEnvironment
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
+from dynx.rbd.parameters import Parameters
 from dynx.steppers.random import Streams
+from dynx.steppers.registry import world_names
 
 CART_POLE: dict[str, Any] = {
     "mass_scale": {"pole": (0.5, 2.0), "cart": {"log_uniform": (0.5, 2.0)}},
@@ -287,6 +291,13 @@ def test_a_delay_of_a_world_shifts_actions() -> None:
         ),
         ({"action_noise": 0.1}, UnsupportedFeatureError, "action_noise needs a Box"),
         ({"friction_scale": 0.5}, UnsupportedFeatureError, "joint_friction"),
+        ({"pushes": {"speed": 1.0, "interval": 5.0}}, UnsupportedFeatureError, "tasks in worlds have pushes"),
+        ({"pushes": {"speed": 1.0}}, ArgumentError, "pushes has no interval"),
+        ({"pushes": {"sped": 1.0, "interval": 5.0}}, UnknownNameError, "did you mean 'speed'"),
+        ({"pushes": {"speed": (-1.0, 1.0), "interval": 5.0}}, ArgumentError, "reaches -1"),
+        ({"pushes": {"speed": 1.0, "interval": 0.05}}, ArgumentError, "last 0.1 s; wanted at most"),
+        ({"pushes": {"speed": 1.0, "interval": True}}, ArgumentError, "the interval of pushes is"),
+        ({"pushes": 1.0}, ArgumentError, "wanted Mapping"),
         ({"payload": {"frame": "pole"}}, ArgumentError, "payload has no mass"),
         ({"payload": {"frame": "pile", "mass": 1.0}}, UnknownNameError, "did you mean 'pole'"),
         ({"payload": {"fram": "pole", "mass": 1.0}}, UnknownNameError, "did you mean 'frame'"),
@@ -344,3 +355,87 @@ def test_a_normal_distribution_is_clamped() -> None:
     assert numbers.min() >= 0.7 - 1e-12
     assert numbers.max() <= 1.3 + 1e-12
     assert numbers.std() == pytest.approx(0.1, rel=0.03)
+
+
+PUSHES: dict[str, Any] = {"speed": (0.5, 1.0), "interval": 0.2, "duration": 0.06}
+
+
+@given(
+    seed=st.integers(0, 2**70),
+    first=st.integers(0, 8),
+    interval=st.integers(1, 40),
+    share=st.floats(0.0, 1.0),
+    deviation=st.booleans(),
+)
+@settings(max_examples=30, deadline=None)
+def test_each_interval_has_one_push_that_depends_on_its_environment_alone(
+    seed: int, first: int, interval: int, share: float, deviation: bool
+) -> None:
+    dt, duration = 0.02, max(1, round(share * interval))
+    speed: Any = {"normal": (1.0, 0.1)} if deviation else (0.5, 1.0)
+    given_pushes = {"speed": speed, "interval": interval * dt, "duration": duration * dt}
+    count = first + 2
+    streams, alone = Streams(*range(seed, seed + count)), Streams(seed + first)
+    many, one = Pushes(given_pushes, dt, count), Pushes(given_pushes, dt, 1)
+    rows, zero = np.arange(count), np.zeros(1, dtype=np.intp)
+    episodes, found = np.arange(count) % 3, np.empty((3 * interval, count, 2))
+    for step in range(3 * interval):
+        # Each environment at a step of its own, and another environment's steps in any order.
+        found[step] = many.at(streams, rows, episodes, np.full(count, step))
+        assert np.array_equal(
+            found[step, first], one.at(alone, zero, episodes[first : first + 1], np.array([step]))[0]
+        )
+    for each in found.reshape(3, interval, count, 2).swapaxes(1, 2).reshape(-1, interval, 2):
+        acting = np.flatnonzero(each.any(axis=1))
+        assert len(acting) == duration
+        assert np.array_equal(acting, acting[0] + np.arange(duration))
+        assert (each[acting] == each[acting[0]]).all()
+        reached = np.linalg.norm(each.sum(axis=0)) * dt
+        low, high = (0.7, 1.3) if deviation else (0.5, 1.0)
+        assert low - 1e-12 <= reached <= high + 1e-12
+
+
+def test_pushes_have_all_directions_and_begin_at_any_time() -> None:
+    n, interval = 3000, 10
+    streams, pushes = Streams(*range(n)), Pushes({"speed": 1.0, "interval": 0.2, "duration": 0.02}, 0.02, n)
+    rows, episodes = np.arange(n), np.zeros(n, dtype=np.int64)
+    found = 0.02 * np.array(
+        [pushes.at(streams, rows, episodes, np.full(n, step)) for step in range(interval)]
+    )
+    assert np.abs(found.sum(axis=0).mean(axis=0)).max() < 6.0 / np.sqrt(2.0 * n)
+    assert np.abs(found.any(axis=2).mean(axis=1) - 0.1).max() < 6.0 * np.sqrt(0.1 * 0.9 / n)
+
+
+@pytest.mark.parametrize("engine", [*world_names(), "dynx in a world"])
+def test_a_push_gives_a_free_robot_its_speed_on_every_engine(engine: str) -> None:
+    """In free flight its centre of mass gets the horizontal velocity, whatever its mass."""
+    task, drawn = Stand(contacts="feet"), {"pushes": PUSHES, "mass_scale": {"trunk": 1.5}}
+    robot = Parameters(task.model, scaled=("trunk",)).model_of(np.array([1.5]))
+    with TaskEnvironment(task, engine.partition(" ")[0], randomize=drawn) as env:
+        if "world" in engine:
+            env.episodes.close()
+            env._episodes = WorldEpisodes(task, "dynx")
+            env._episodes.vary(Randomization.read(drawn))
+        env.reset(seed=0, options={"disturbance": 0.0})
+        episodes: Any = env.episodes
+        variation: Any = env._variation
+        if isinstance(episodes, WorldEpisodes):
+            q = episodes.world.state.robots["dog"].q.copy()
+            q[2] += 5.0
+            episodes.world.set_state(robots={"dog": (q, np.zeros(18))})
+        else:
+            q, v, memory = episodes.state
+            q[2] += 5.0
+            episodes.state = State(q, v, memory)
+        wanted, found = [np.zeros(2)], [np.zeros(2)]
+        with backend("compiled", robot) as dynamics:
+            for _ in range(20):
+                wanted.append(wanted[-1] + 0.02 * variation.accelerations()[0])
+                env.step(np.zeros(12, dtype=np.float32))
+                if isinstance(episodes, WorldEpisodes):
+                    q, v = episodes.world.state.robots["dog"]
+                else:
+                    q, v, _ = episodes.state
+                found.append(dynamics.centroidal_momentum(q, v)[:2] / robot.total_mass)
+    assert np.linalg.norm(wanted[10]) > 0.5
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-12)
