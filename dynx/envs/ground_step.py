@@ -262,6 +262,11 @@ class GroundStep(TaskStep):
         """True if joints stop at limits."""
         return self._contacts.robot.limited
 
+    @property
+    def delayed_actions(self) -> int:
+        """0: a step is given the action that acts in it."""
+        return 0
+
     def robot_text(self, *, stops: bool = False) -> StepText:
         """Return the text of a step of the robot: from ``state``, ``action``, drawn ``parameters`` and a
         ``push`` to the next ``state``, in which only the memory of the task is the same. Without `stops` the

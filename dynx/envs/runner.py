@@ -35,7 +35,7 @@ from dynx.envs.task import (
     WorldTask,
     free_move,
 )
-from dynx.envs.variation import VariedGround, VariedRobot, VariedScene
+from dynx.envs.variation import VariedGround, VariedRobot, VariedScene, WaitingActions
 from dynx.errors import DivergedError, UnsupportedFeatureError
 from dynx.model.elements import JointCoefficients
 from dynx.model.numbers import DIVERGENCE_SPEED
@@ -272,6 +272,8 @@ class GroundEpisodes(CompiledEpisodes):
     """Episodes of a `GroundTask` in one lane of the kernels of its vectors of environments, with their
     bits."""
 
+    _varied: VariedGround
+
     def __init__(self, task: GroundTask, contacts: GroundContacts, joints: JointOptions = DESCRIBED) -> None:
         """Raises UnsupportedFeatureError for a task that cannot be compiled."""
         # Imported here, because other engines need no compiler.
@@ -288,6 +290,9 @@ class GroundEpisodes(CompiledEpisodes):
         varied = VariedGround(self._motion, self._randomization, self._joints, self._contacts.touching.shapes)
         self._varied = varied
         self._use(GroundStep(self._motion, self._contacts, varied))
+        longest = varied.delayed_actions
+        self._waiting = WaitingActions(1, self._step.actions, longest) if longest else None
+        self._delays = np.zeros(1, dtype=np.int64)
 
     def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
         """Return the parameters of this robot that episodes draw."""
@@ -295,9 +300,24 @@ class GroundEpisodes(CompiledEpisodes):
         self._open_lane()
         return self._varied.drawn_parameters
 
+    def set_parameters(self, values: Floats) -> None:
+        """Give the robot of the next episode the values (k,) of the parameters that `vary` returned."""
+        super().set_parameters(values)
+        if self._waiting is not None:
+            self._delays = self._varied.delays(values[None])
+
     def push(self, acceleration: Floats) -> None:
         """Push the robot during the next step, with an acceleration (2,) [m/s^2]."""
         self._lanes.arrays["push"][0] = acceleration
+
+    def step(self, action: Any) -> Outcome:
+        if self._waiting is None:
+            return super().step(action)
+        flat, steps = np.reshape(action, (1, -1)), np.array([self._steps])
+        (acting,) = self._waiting.acting(flat, steps, self._delays)
+        outcome = super().step(acting)
+        self._waiting.accept()
+        return outcome
 
     @cached_property
     def _world(self) -> World:

@@ -135,6 +135,12 @@ class TaskStep:
         return self._varied.stops
 
     @property
+    def delayed_actions(self) -> int:
+        """Number of actions before the present one that are inputs of a step."""
+        found: int = self._varied.delayed_actions
+        return found
+
+    @property
     def modes(self) -> int:
         """Number of modes of dry friction in all steps of the integrator."""
         return 0 if self._friction is None else self._friction.size * self._task.substeps
@@ -209,8 +215,8 @@ class TaskStep:
             sizes = {"state": self.layout.size, "steps": 1, "limit": 1, "action": self.actions, **sizes}
             if self._varied.drawn_parameters:
                 sizes["parameters"] = len(self._varied.drawn_parameters)
-                if self._varied.delayed_actions:
-                    sizes["earlier"] = self._varied.delayed_actions * self.actions
+                if self.delayed_actions:
+                    sizes["earlier"] = self.delayed_actions * self.actions
             if self.modes:
                 sizes |= {"modes": self.modes, "one_by_one": 1}
             if isinstance(limits, StopsText):

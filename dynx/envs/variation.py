@@ -1,6 +1,7 @@
 """Drawn parameters of a robot or a scene, and what they change.
 
 `VariedRobot`: masses, payload and joint dynamics of a task of one robot, and the delay of actions.
+`VariedGround`: those of a robot on the ground in a kernel, and `WaitingActions`.
 `VariedScene`: masses, payload, friction of joints and of contacts in a world.
 """
 
@@ -12,6 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.envs.randomization import AXES, Parameter, Randomization, parameters_of, require_name
 from dynx.envs.task import DESCRIBED, JointOptions, RobotTask
@@ -63,7 +65,7 @@ class VariedRobot:
         self.drawn_parameters: tuple[Parameter, ...] = (
             ()
             if randomization is None
-            else parameters_of(randomization, self.fields, self._required, task.step_dt)
+            else parameters_of(randomization, self.fields, self._required, self._delay_step)
         )
         """Parameters that change the motion."""
         scales = self._columns("mass_scale")
@@ -94,9 +96,15 @@ class VariedRobot:
         ]
         """For each parameter the column of the drawn values, or the value of one that is not drawn."""
         self.delayed_actions = math.ceil(
-            np.round(bounds.get("delay", (0.0, 0.0))[1] / task.step_dt) / task.substeps
+            np.round(bounds.get("delay", (0.0, 0.0))[1] / self._delay_step)
+            / round(task.control_dt / self._delay_step)
         )
         """Number of actions before the present one that may still act."""
+
+    @property
+    def _delay_step(self) -> float:
+        """Time [s] to multiples of which delays are rounded."""
+        return self._task.step_dt
 
     def _refuse_other_fields(self, task: RobotTask, randomization: Randomization) -> None:
         """Raise UnsupportedFeatureError for a parameter that the task does not have."""
@@ -169,7 +177,7 @@ class VariedRobot:
 class VariedGround(VariedRobot):
     """The parameters of a robot with motors on the ground that episodes draw, in a kernel."""
 
-    fields = (*SCENE_FIELDS, *MOTOR_FIELDS)
+    fields = (*SCENE_FIELDS, *MOTOR_FIELDS, "delay")
 
     def __init__(
         self,
@@ -186,11 +194,17 @@ class VariedGround(VariedRobot):
         self.stops = False
 
     def _refuse_other_fields(self, task: RobotTask, randomization: Randomization) -> None:
-        if randomization.delay is not None:
-            raise UnsupportedFeatureError(
-                f"kernels of {type(task).__name__} do not have delay, which worlds have: wanted another "
-                "engine, or for Stand and Walk contacts='all'"
-            )
+        """A kernel has all parameters that worlds have."""
+
+    @property
+    def _delay_step(self) -> float:
+        """Time [s] to multiples of which delays are rounded, as in worlds."""
+        return self._task.control_dt
+
+    def delays(self, values: Floats) -> NDArray[np.int64]:
+        """Return the delays (n,) in control steps, of drawn values (n, k)."""
+        column = self._columns("delay")[None]
+        return np.rint(values[:, column] / self._task.control_dt).astype(np.int64)
 
     def draws(self, *fields: str) -> bool:
         """Check whether one of some parameters is drawn."""
@@ -244,6 +258,30 @@ class VariedGround(VariedRobot):
             return super()._required(field, own)
         known = sorted({name for shape in self._touching for name in shape.parts})
         return require_name("part that touches", own, known)
+
+
+class WaitingActions:
+    """Actions of `count` environments that act after delays of whole control steps.
+
+    The first action of an episode acts from its start, because there is none before it.
+    """
+
+    def __init__(self, count: int, size: int, longest: int) -> None:
+        """`longest` is the number of control steps of the longest delay."""
+        self._actions = np.zeros((longest + 1, count, size))
+        self._place, self._rows = 0, np.arange(count)
+
+    def acting(self, actions: Floats, steps: NDArray[np.int64], delays: NDArray[np.int64]) -> Floats:
+        """Return the actions (count, size) that act in a step with `actions` (count, size), from the numbers
+        of the `steps` (count,) in their episodes and the `delays` (count,)."""
+        self._actions[self._place] = actions
+        age = np.minimum(delays, np.maximum(steps, 0))
+        found: Floats = self._actions[(self._place - age) % len(self._actions), self._rows]
+        return found
+
+    def accept(self) -> None:
+        """Note that the step was taken. Until then it may be replaced by another one."""
+        self._place = (self._place + 1) % len(self._actions)
 
 
 class VariedScene:

@@ -18,7 +18,7 @@ from dynx.envs.randomization import Randomization, Variation, first_seed
 from dynx.envs.runner import draw_on_ground, draw_robot
 from dynx.envs.task import JointOptions, RobotTask
 from dynx.envs.task_step import DIVERGED, INVALID, TaskStep
-from dynx.envs.variation import VariedGround, VariedRobot
+from dynx.envs.variation import VariedGround, VariedRobot, WaitingActions
 from dynx.errors import (
     ArgumentError,
     ClosedError,
@@ -125,6 +125,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         drawn = None if randomize is None else Randomization.read(randomize)
         joints = JointOptions(joint_damping, joint_friction, joint_armature, joint_springs, joint_limits)
         self._task_step: TaskStep
+        self._waiting: WaitingActions | None = None
         varied: VariedRobot
         if isinstance(task, GroundTask):
             try:
@@ -132,11 +133,11 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             except UnsupportedFeatureError as error:
                 raise UnsupportedFeatureError(f"{error}; {IN_WORLDS}, which keep all contacts") from None
             motion = motion_of(task, contacts)
-            try:
-                varied = VariedGround(motion, drawn, joints, contacts.touching.shapes)
-            except UnsupportedFeatureError as error:
-                raise UnsupportedFeatureError(f"{error}; then {IN_WORLDS}") from None
+            varied = VariedGround(motion, drawn, joints, contacts.touching.shapes)
             self._task_step = GroundStep(motion, contacts, varied)
+            if varied.delayed_actions:
+                self._delays = varied.delays
+                self._waiting = WaitingActions(n, self._task_step.actions, varied.delayed_actions)
         else:
             varied = VariedRobot(task, drawn, joints)
             self._task_step = TaskStep(task, varied)
@@ -270,7 +271,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             or actions.dtype.kind not in self._kinds
         ):
             actions = checked_actions(self._kinds, self._actions.shape, actions)
-        self._actions[...] = self._noisy(actions)
+        self._actions[...] = self._acting(actions)
         if self._variation is not None and self._variation.pushes is not None:
             self._arrays["push"][: self.num_envs] = self._variation.accelerations()
         self._lanes.evaluate()
@@ -281,6 +282,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         if largest >= INVALID:
             self._task_step.refuse_not_finite(flags)
         self._lanes.accept()
+        if self._waiting is not None:
+            self._waiting.accept()
         infos: dict[str, Any] = {}
         if self._variation is not None:
             self._variation.count_step()
@@ -307,22 +310,35 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             observations[...] = self._observed()
         return observations, rewards, terminated, truncated, infos
 
-    def _noisy(self, actions: Any) -> Any:
-        """Return the actions of all environments with noise where it is drawn."""
-        noise = None if self._variation is None else self._variation.action_noise
-        space = self.single_action_space
-        if noise is None or self._variation is None or not isinstance(space, spaces.Box):
+    def _acting(self, actions: Any) -> Any:
+        """Return the actions that act in all environments: with noise and after delays, where these are
+        drawn."""
+        variation = self._variation
+        if variation is None or (variation.action_noise is None and self._waiting is None):
             return actions
-        low, high = space.low, space.high
-        rounded = np.asarray(actions).astype(low.dtype)
-        # Environments that start an episode ignore their actions.
-        checked = np.ones(self.num_envs, dtype=np.bool_)
-        checked[self._ended] = False
-        invalid = ~((rounded >= low) & (rounded <= high)).reshape(self.num_envs, -1).all(axis=1)
-        if (invalid & checked).any():
-            raise_invalid_action(space, actions, invalid & checked)
+        # The kernel checks the actions that act.
+        self._refuse_invalid(actions)
         flat = np.asarray(actions, dtype=np.float64).reshape(self.num_envs, -1)
-        return noise.added(flat, self._variation.noise_on_actions()).reshape(self._actions.shape)
+        if variation.action_noise is not None:
+            flat = variation.action_noise.added(flat, variation.noise_on_actions())
+        if self._waiting is not None:
+            steps = self._lanes.now["steps"][: self.num_envs, 0].astype(np.int64)
+            flat = self._waiting.acting(flat, steps, self._delays(variation.values))
+        return flat.reshape(self._actions.shape)
+
+    def _refuse_invalid(self, actions: Any) -> None:
+        """Raise the error of the first environment whose action is not in its space."""
+        space: Any = self.single_action_space
+        if self._discrete:
+            rounded, low, high = np.asarray(actions), space.start, space.start + space.n - 1
+        else:
+            # Numbers that the space's dtype rounds to a bound are within it.
+            rounded, low, high = np.asarray(actions).astype(space.dtype), space.low, space.high
+        invalid = ~((rounded >= low) & (rounded <= high)).reshape(self.num_envs, -1).all(axis=1)
+        # Environments that start an episode ignore their actions.
+        invalid[self._ended] = False
+        if invalid.any():
+            raise_invalid_action(space, actions, invalid)
 
     def _observed(self) -> Floats:
         """Return the observations that the kernel found, with noise where it is drawn."""

@@ -30,6 +30,7 @@ DRAWN = {
     "motor_strength": (0.7, 1.1),
     "gravity_scale": (0.9, 1.1),
     "pushes": {"speed": (0.5, 1.0), "interval": 0.2, "duration": 0.06},
+    "delay": (0.0, 0.08),
     "observation_noise": 0.01,
     "action_noise": 0.02,
 }
@@ -54,9 +55,9 @@ def vector(task: GroundTask, count: int, **options: Any) -> Iterator[RobotVector
         (Walk(contacts="feet"), None),
         (Stand(contacts="feet"), None),
         (Walk(contacts="feet"), DRAWN),
-        (Stand(contacts="feet"), {"pushes": DRAWN["pushes"]}),
+        (Stand(contacts="feet"), {"pushes": DRAWN["pushes"], "delay": (0.0, 0.08)}),
     ],
-    ids=["Walk", "Stand", "drawn", "pushed"],
+    ids=["Walk", "Stand", "drawn", "pushed and delayed"],
 )
 def test_each_lane_is_the_single_environment(task: GroundTask, randomize: Mapping[str, Any] | None) -> None:
     """Bit for bit, with episodes that end and start anew by a mask."""
@@ -285,7 +286,6 @@ def test_what_kernels_do_not_have_is_refused_by_name() -> None:
     refused: list[tuple[GroundTask, dict[str, Any], str]] = [
         (Walk(), {}, "at most 16.*contacts='feet'.*vectorization_mode='sync' or 'async'"),
         (Remembering(contacts="feet"), {}, "Remembering has a method info of its own"),
-        (Walk(contacts="feet"), {"randomize": {"delay": 0.02}}, "do not have delay.*contacts='all'.*'sync'"),
         (
             Walk(contacts="feet"),
             {"randomize": {"joint_friction": {"FR_hip_joint": 0.5}}, "joint_limits": False},
@@ -303,14 +303,66 @@ def test_what_kernels_do_not_have_is_refused_by_name() -> None:
         Walk(contacts="foot")
 
 
-def test_a_single_environment_is_not_told_of_vectors() -> None:
-    """A delay needs a world, which ``contacts='all'`` gives on the same engine."""
-    randomize = {"delay": 0.02}
-    with pytest.raises(UnsupportedFeatureError, match=r"do not have delay.*contacts='all'$"):
-        TaskEnvironment(Walk(contacts="feet"), "dynx", randomize=randomize)
-    with TaskEnvironment(Walk(contacts="all"), "dynx", randomize=randomize) as env:
-        assert isinstance(env.episodes, WorldEpisodes)
-        assert env.reset(seed=0)[1]["parameters"] == {"delay": 0.02}
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_an_action_acts_after_the_drawn_delay(mode: str) -> None:
+    """The observation has the action that acted: the one that many steps before, or the first of the
+    episode."""
+    count, limit = 9, 7
+    actions, task = actions_of(20, count), Walk(contacts="feet")
+    with vector(
+        task, count, randomize={"delay": (0.0, 0.1)}, autoreset_mode=mode, max_episode_steps=limit
+    ) as envs:
+        _, infos = envs.reset(seed=0)
+        delays = np.rint(infos["parameters"]["delay"] / task.control_dt).astype(int)
+        assert set(delays.tolist()) >= {0, 1, 4}
+        steps, begun = np.zeros(count, dtype=int), np.zeros(count, dtype=int)
+        for k, each in enumerate(actions):
+            observations, _, terminated, truncated, infos = envs.step(each)
+            fresh = infos.get("_parameters", np.zeros(count, dtype=bool))
+            steps += 1
+            if mode == "NextStep":
+                steps[fresh], begun[fresh] = 0, k + 1
+            acted = np.maximum(k - delays, begun)
+            for row in np.flatnonzero((steps > 0) & ~fresh):
+                assert np.array_equal(observations[row, 33:45], actions[acted[row], row])
+            if mode == "SameStep":
+                assert np.array_equal(fresh, terminated | truncated)
+                begun[fresh] = k + 1
+            if fresh.any():
+                drawn = infos["parameters"]["delay"]
+                delays[fresh] = np.rint(drawn / task.control_dt).astype(int)[fresh]
+    assert (begun > limit).any()
+
+
+def test_delays_of_kernels_and_worlds_have_one_law() -> None:
+    actions, drawn = actions_of(6, 1)[:, 0], {"delay": 0.04}
+    found: list[list[Floats]] = []
+    for contacts, engine in (("feet", "dynx"), ("all", "dynx"), ("feet", "mujoco")):
+        with TaskEnvironment(Walk(contacts=contacts), engine, randomize=drawn) as env:
+            assert isinstance(
+                env.episodes, GroundEpisodes if contacts + engine == "feetdynx" else WorldEpisodes
+            )
+            assert env.reset(seed=0)[1]["parameters"] == drawn
+            found.append([env.step(each)[0][33:45] for each in actions])
+    for each in found:
+        assert np.array_equal(each, actions[[0, 0, 0, 1, 2, 3]])
+
+
+def test_an_invalid_action_is_refused_before_it_waits() -> None:
+    with (
+        vector(Walk(contacts="feet"), 9, randomize={"delay": 0.04}) as envs,
+        vector(Walk(contacts="feet"), 9, randomize={"delay": 0.04}) as others,
+    ):
+        for each in (envs, others):
+            each.reset(seed=0)
+        for given in actions_of(5, 9):
+            for wrong in (np.nan, 1.5):
+                invalid = given.copy()
+                invalid[5, 3] = wrong
+                with pytest.raises(ArgumentError, match=r"environment 5: action\[3\] is"):
+                    envs.step(invalid)
+            for mine, wanted in zip(envs.step(given)[:4], others.step(given)[:4], strict=True):
+                assert np.array_equal(mine, wanted)
 
 
 def test_pictures_show_the_scene() -> None:
