@@ -12,7 +12,7 @@ documentation shows a task of your own. Needs the extra ``envs``.
 from typing import TYPE_CHECKING
 
 from dynx.envs.environment import TaskEnvironment
-from dynx.envs.ground_task import GroundTask
+from dynx.envs.ground_task import GroundState, GroundTask
 from dynx.envs.randomization import Randomization
 from dynx.envs.registration import make_environment, register_task, register_tasks
 from dynx.envs.task import Episode, Episodes, Outcome, RobotTask, State, Task, WorldTask
@@ -21,6 +21,7 @@ from dynx.registry import moved_names
 __all__ = [
     "Episode",
     "Episodes",
+    "GroundState",
     "GroundTask",
     "Outcome",
     "Randomization",

@@ -8,11 +8,11 @@ each lane.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from dynx.backends.solvability import Solvability
 from dynx.compiled.contact_step import refuse_other_joints, shapes_on_plane
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.step import StepText, compiled
-from dynx.envs.ground_task import GroundTask
+from dynx.envs.ground_task import GroundState, GroundTask
 from dynx.envs.library import Space
 from dynx.envs.stops import LimitWatch, StopsText
 from dynx.envs.task import DESCRIBED, JointOptions, RobotTask, State
@@ -50,9 +50,22 @@ MAX_POINTS = 16
 """Largest number of points at which a robot may touch the ground. Code and time of a kernel grow with it."""
 
 
+class ContactMemory(NamedTuple):
+    """Numbers that kernels keep of the contacts."""
+
+    impulses: Array
+    """Impulses (m,) of the last step of the robot."""
+    residual: Array
+    """Largest residual (1,) [m/s] in this control step."""
+    sums: Array
+    """Sums (3 n,) of the impulses [N s] on each of the `contact_links` in this control step: along the normal
+    and the tangents of the ground."""
+    forces: Array
+    """Mean forces (3 n,) [N] on them in the last control step, in world axes."""
+
+
 class GroundMotion(RobotTask):
-    """A `GroundTask` as the text of a kernel calls it. Its memory begins with the impulses (m,) of the last
-    step of the robot, and the largest residual of its contacts (1,) [m/s] in this control step."""
+    """A `GroundTask` as the text of a kernel calls it. Its memory begins with `ContactMemory`."""
 
     hook_names = {  # noqa: RUF012  (declared by `RobotTask`)
         "start": "initial_state",
@@ -65,7 +78,8 @@ class GroundMotion(RobotTask):
 
     def __init__(self, task: GroundTask, contacts: GroundContacts) -> None:
         self.task = task
-        self._impulses = contacts.impulses
+        forces = 3 * len(task.contact_links)
+        self._sizes = (contacts.impulses, 1, forces, forces)
         for name in ("control_dt", "substeps", "random_size", "max_episode_steps", "reward_threshold"):
             setattr(self, name, getattr(task, name))
 
@@ -89,17 +103,19 @@ class GroundMotion(RobotTask):
         """Space of the actions."""
         return self.task.action_space
 
-    def own_state(self, state: State) -> State:
-        """Return a state with the memory of the task alone."""
-        return State(state.q, state.v, state.memory[self._impulses + 1 :])
+    def own_state(self, state: State) -> GroundState:
+        """Return a state with the memory of the task alone, and the contact forces."""
+        forces = self.contacts(state).forces.reshape(-1, 3)
+        return GroundState(state.q, state.v, state.memory[sum(self._sizes) :], forces)
 
-    def with_contacts(self, state: State, impulses: Array, residual: Array) -> State:
+    def with_contacts(self, state: State, contacts: ContactMemory) -> State:
         """Return a state of the task with what the kernels keep of the contacts."""
-        return State(state.q, state.v, np.concatenate([impulses, residual, state.memory]))
+        return State(state.q, state.v, np.concatenate([*contacts, state.memory]))
 
-    def contacts(self, state: State) -> tuple[Array, Array]:
-        """Return the impulses (m,) and the residual (1,)."""
-        return state.memory[: self._impulses], state.memory[self._impulses : self._impulses + 1]
+    def contacts(self, state: State) -> ContactMemory:
+        """Return what the kernels keep of the contacts."""
+        ends = np.cumsum(self._sizes).tolist()
+        return ContactMemory(*(state.memory[end - n : end] for n, end in zip(self._sizes, ends, strict=True)))
 
     def require_start_options(self, options: Mapping[str, Any]) -> None:
         """Raise UnknownNameError for an option of `reset` that the task does not take."""
@@ -108,7 +124,7 @@ class GroundMotion(RobotTask):
     def start(self, random: Array, **options: Any) -> State:
         """Return the state at the start of an episode."""
         first = self.task.initial_state(random, **options)
-        return self.with_contacts(first, np.zeros(self._impulses), np.zeros(1))
+        return self.with_contacts(first, ContactMemory(*map(np.zeros, self._sizes)))
 
     def torque(self, robot: Any, state: State, action: Array) -> Array:
         """Return the targets, since the kernel of the robot has the motors, and the next memory."""
@@ -174,6 +190,7 @@ class GroundContacts:
         touching = shapes_on_plane(layout)
         robot = layout.robots[0]
         model = robot.model
+        task.require_contact_links()
         refuse_other_joints(model)
         Solvability(model).refuse_singular(joint_dynamics=bool(robot.armature.any()))
         points = sum(touching.counts)
@@ -193,6 +210,18 @@ class GroundContacts:
     def contact_impulses(self) -> int:
         """Number of impulses of the contacts in a step."""
         return 3 * sum(self.touching.counts)
+
+    def impulses_on(self, links: Sequence[str], impulses: Array) -> Array:
+        """Return the sums (3 n,) of the impulses (m,) of the contacts on each of some links."""
+        sums: Array = np.zeros((len(links), 3), dtype=object)
+        first = 0
+        for count, shape in zip(self.touching.counts, self.touching.shapes, strict=True):
+            rows = impulses[first : first + 3 * count].reshape(count, 3)
+            first += 3 * count
+            if shape.parts[0] in links:
+                k = links.index(shape.parts[0])
+                sums[k] = sums[k] + sum(rows[1:], rows[0])
+        return sums.ravel()
 
     @cached_property
     def impulses(self) -> int:
@@ -294,7 +323,8 @@ class GroundStep(TaskStep):
         drawn = inputs.get("parameters", np.zeros(0))
         own = motion.own_state(State(*map(traced_array, state)))
         target = symbol_array(motion.task.targets(own, self._shaped(traced_array(inputs["action"]))))
-        impulses, residual = motion.contacts(state)
+        kept_contacts = motion.contacts(state)
+        impulses = kept_contacts.impulses
         joints = varied.joints(self._joints, drawn)
         rows, first = joints.limited, contacts.contact_impulses
         if first + len(rows) != contacts.impulses:
@@ -327,11 +357,13 @@ class GroundStep(TaskStep):
             repeat,
             regrouped=regrouped,
         )
-        largest = maximum(result["residual"][0], residual[0])
+        largest = maximum(result["residual"][0], kept_contacts.residual[0])
         found = np.zeros(contacts.impulses, dtype=object)
         found[kept] = result["impulses"]
+        sums = kept_contacts.sums + contacts.impulses_on(motion.task.contact_links, found)
         after = State(result["q"], result["v"], own.memory)
-        return motion.with_contacts(after, found, np.array([largest], dtype=object))
+        residual = np.array([largest], dtype=object)
+        return motion.with_contacts(after, ContactMemory(found, residual, sums, kept_contacts.forces))
 
     def _beyond(self, before: Array, after: Array) -> Any:
         """Return how far a step moves a joint beyond a stop, or further beyond it [rad or m]; 0 for none."""
@@ -357,10 +389,14 @@ class GroundStep(TaskStep):
     ) -> State:
         motion = self._motion
         moved = self.layout.state(inputs["moved"])
-        own, (impulses, residual) = motion.own_state(moved), motion.contacts(moved)
-        results["residual"] = residual
+        kept = motion.contacts(moved)
+        results["residual"] = kept.residual
+        # Rows of normal and tangents, by the axes of the ground.
+        forces = kept.sums.reshape(-1, 3) @ np.array(self._contacts.touching.axes) / motion.control_dt
+        kept = ContactMemory(kept.impulses, np.zeros(1), 0.0 * kept.sums, forces.ravel())
+        own = motion.own_state(motion.with_contacts(motion.own_state(moved), kept))
         memory = motion.task.remember(own, self._shaped(inputs["action"]))
-        return motion.with_contacts(State(own.q, own.v, memory), impulses, np.zeros(1))
+        return motion.with_contacts(State(own.q, own.v, memory), kept)
 
 
 class GroundLanes(TaskLanes):

@@ -14,19 +14,38 @@ from typing import TYPE_CHECKING, Any, ClassVar, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dynx.envs.task import DESCRIBED, Episode, Episodes, JointOptions, State, WorldTask, opened
-from dynx.errors import UnknownNameError, UnsupportedFeatureError, nearest, shown
+from dynx.envs.task import DESCRIBED, NO_MEMORY, Episode, Episodes, JointOptions, State, WorldTask, opened
+from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model import Model
-from dynx.spatial.scalar import Array
+from dynx.spatial.scalar import Array, Floats
 
 if TYPE_CHECKING:
     from dynx.world.scene import SceneRobot
+    from dynx.world.world import World
 
 KERNEL_ENGINE = "dynx"
 """World engine whose episodes step in a compiled kernel, where it has all that a task needs."""
 
 WORLD_METHODS = ("start", "loads", "settle", "observation", "reward", "reward_terms", "terminated", "info")
 """Methods of `WorldTask` that `GroundTask` implements by its hooks."""
+
+
+NO_FORCES: Array = np.zeros((0, 3))
+NO_FORCES.setflags(write=False)
+
+
+class GroundState(State):
+    """Configuration and velocity of a robot on the ground, the memory of the task, and contact forces."""
+
+    forces: Array = NO_FORCES
+    """Contact force (n, 3) on each of the task's `contact_links` in the axes of the world, mean over the last
+    control step [N]; 0 before the first."""
+
+    def __new__(cls, q: Array, v: Array, memory: Array = NO_MEMORY, forces: Array = NO_FORCES) -> GroundState:
+        """Return a state; `forces` are (n, 3) [N]."""
+        made = super().__new__(cls, q, v, memory)
+        made.forces = forces
+        return made
 
 
 class GroundTask(WorldTask):
@@ -46,6 +65,11 @@ class GroundTask(WorldTask):
     random_size: ClassVar[int] = 0
     """Number of random numbers that `initial_state` takes."""
 
+    @property
+    def contact_links(self) -> tuple[str, ...]:
+        """Names of the links whose contact forces the hooks read as ``state.forces``; by default none."""
+        return ()
+
     @abstractmethod
     def initial_state(self, random: Array) -> State:
         """Return the state at the start of an episode, from numbers (random_size,) uniform in [0, 1).
@@ -54,26 +78,26 @@ class GroundTask(WorldTask):
         """
 
     @abstractmethod
-    def targets(self, state: State, action: Array) -> Array:
+    def targets(self, state: GroundState, action: Array) -> Array:
         """Return the target positions (n joints,) of the motors during a control step."""
 
-    def remember(self, state: State, action: Array) -> Array:
+    def remember(self, state: GroundState, action: Array) -> Array:
         """Return the memory (k,) after a control step; by default it is unchanged."""
         return state.memory
 
     @abstractmethod
-    def observe(self, state: State) -> Array:
+    def observe(self, state: GroundState) -> Array:
         """Return the observation, an array of the observation space's shape."""
 
     @abstractmethod
-    def terms(self, before: State, action: Array, after: State) -> Mapping[str, Any]:
+    def terms(self, before: GroundState, action: Array, after: GroundState) -> Mapping[str, Any]:
         """Return the terms whose sum is the reward of a control step, by name."""
 
-    def is_over(self, state: State) -> Any:
+    def is_over(self, state: GroundState) -> Any:
         """Check whether the episode is over; by default it never is."""
         return False
 
-    def describe(self, state: State) -> dict[str, Any]:
+    def describe(self, state: GroundState) -> dict[str, Any]:
         """Return the info of a step; by default it is empty."""
         return {}
 
@@ -105,17 +129,30 @@ class GroundTask(WorldTask):
                     f"{type(self).__name__} has no option {shown(name)} of reset{nearest(name, known)}"
                 )
 
+    def require_contact_links(self) -> None:
+        """Raise UnknownNameError for a name of `contact_links` that the robot does not have, ArgumentError
+        for a link without a collision shape."""
+        for name in self.contact_links:
+            if not self.model.geometry.collisions(self.model.link(name).name):
+                raise ArgumentError(f"{name} has no collision shape, so nothing touches it")
+
     def start(self, episode: Episode, **options: Any) -> None:
         """Set the state of the world and the memory to those of `initial_state`."""
         first = self.initial_state(episode.rng.random(self.random_size), **options)
         (name,) = episode.world.state.robots
         episode.world.set_state(robots={name: (first.q, first.v)})
         episode.memory.numbers = np.array(first.memory, dtype=np.float64)
+        episode.memory.forces = np.zeros((len(self.contact_links), 3))
 
-    def state(self, episode: Episode) -> State:
+    @property
+    def contact_interval(self) -> float | None:
+        """Interval [s] over which a world sums contacts: a control step, if the task has `contact_links`."""
+        return self.control_dt if self.contact_links else None
+
+    def state(self, episode: Episode) -> GroundState:
         """Return the present state of the robot in a world."""
         ((q, v),) = episode.world.state.robots.values()
-        return State(q, v, episode.memory.numbers)
+        return GroundState(q, v, episode.memory.numbers, episode.memory.forces)
 
     def loads(self, episode: Episode, action: Any) -> Mapping[str, Any]:
         """Return motors with the `targets`."""
@@ -127,9 +164,20 @@ class GroundTask(WorldTask):
         return {"motors": {name: PositionMotor(target, kp=self.kp, kd=self.kd, max_force=self.max_torque)}}
 
     def settle(self, episode: Episode, action: Any) -> None:
-        """Keep the memory that `remember` returns."""
+        """Keep the contact forces, and the memory that `remember` returns."""
         memory, given = episode.memory, np.asarray(action, dtype=np.float64)
+        if self.contact_links:
+            memory.forces = np.array(
+                [self._contact_force(episode.world, link) for link in self.contact_links]
+            )
         memory.numbers = self.remember(self.state(episode), given)
+
+    def _contact_force(self, world: World, link: str) -> Floats:
+        """Return the mean contact force (3,) on a link in the last control step [N], in world axes."""
+        (name,) = world.state.robots
+        part = f"{name}/{link}"
+        means = world.mean_contacts(part)
+        return sum((each.force if each.a == part else -each.force for each in means), np.zeros(3))
 
     def observation(self, episode: Episode) -> NDArray[Any]:
         """Return what `observe` returns."""
@@ -156,6 +204,7 @@ class GroundTask(WorldTask):
     def open(self, engine: str, joints: JointOptions = DESCRIBED) -> Episodes:
         """Return the episodes of this task: on engine `dynx` in a lane of the kernel of vectors of
         environments, where it has all that the task needs; otherwise in a world."""
+        self.require_contact_links()
         make = "ground_episodes" if engine == KERNEL_ENGINE else "WorldEpisodes"
         return opened(make, self, engine, joints)
 

@@ -442,6 +442,7 @@ class WorldEpisodes(Episodes):
         self._options = {
             "dt": task.control_dt,
             "substeps": task.substeps,
+            "contact_interval": task.contact_interval,
             **task.settings.get(engine, {}),
             **joints.switched_off,
         }

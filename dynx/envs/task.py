@@ -425,6 +425,11 @@ class WorldTask(Task):
     settings: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     """Options of `World` by engine, such as ``{"pybullet": {"solver_iterations": 50}}``."""
 
+    @property
+    def contact_interval(self) -> float | None:
+        """Interval [s] over which `World.mean_contacts` sums contacts; by default None, without sums."""
+        return None
+
     @abstractmethod
     def scene(self) -> Scene:
         """Return the scene in which episodes start."""

@@ -107,7 +107,7 @@ FLOWS = {
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
         154,
-        27930,
+        28000,
     ),
 }
 

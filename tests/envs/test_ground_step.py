@@ -55,9 +55,12 @@ def vector(task: GroundTask, count: int, **options: Any) -> Iterator[RobotVector
         (Walk(contacts="feet"), None),
         (Stand(contacts="feet"), None),
         (Walk(contacts="feet"), DRAWN),
-        (Stand(contacts="feet"), {"pushes": DRAWN["pushes"], "delay": (0.0, 0.08)}),
+        (
+            Stand(contacts="feet", foot_forces=True),
+            {"pushes": DRAWN["pushes"], "delay": (0.0, 0.08), "observation_noise": 0.01},
+        ),
     ],
-    ids=["Walk", "Stand", "drawn", "pushed and delayed"],
+    ids=["Walk", "Stand", "drawn", "pushed, delayed, with forces"],
 )
 def test_each_lane_is_the_single_environment(task: GroundTask, randomize: Mapping[str, Any] | None) -> None:
     """Bit for bit, with episodes that end and start anew by a mask."""

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from dynx.envs.ground_task import GroundTask
+from dynx.envs.ground_task import GroundState, GroundTask
 from dynx.envs.library import spaces
 from dynx.envs.task import State, camera_at, component_names, refuse_unknown_choice
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.model.numbers import is_real
+from dynx.model.numbers import checked_bool, is_real
 from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.world import Material, Scene, SceneRobot, ground
@@ -58,17 +58,21 @@ class Quadruped(GroundTask):
     Action (12,): angles of the joints from the standing posture, in units of 0.4 rad. Observation (45,):
     linear velocity [m/s] and angular velocity [rad/s] of the trunk and the direction of gravity in its axes,
     angles of the joints from the posture [rad], their velocities [rad/s], and the last action; velocities are
-    clipped at 100. The episode terminates where the trunk falls.
+    clipped at 100. With `foot_forces` follow the contact forces on the feet, mean over the last control step,
+    in the axes of the trunk and in units of the robot's weight (57,). The episode terminates where the trunk
+    falls.
     """
 
     contacts: str = field(default="all", kw_only=True)
     """Links that touch the ground: ``all``, or the ``feet`` alone."""
+    foot_forces: bool = field(default=False, kw_only=True)
+    """True for observations with the contact forces of the feet."""
 
     control_dt = 0.02
     substeps = 5
     max_episode_steps = 500
     observation_size: ClassVar[int] = 45
-    """Number of entries of the observation."""
+    """Number of entries of the observation without forces."""
     kp = KP
     kd = KD
     max_torque = MAX_TORQUE
@@ -76,6 +80,7 @@ class Quadruped(GroundTask):
 
     def __post_init__(self) -> None:
         refuse_unknown_choice("contacts", self.contacts, CONTACTS)
+        checked_bool("foot_forces", self.foot_forces)
 
     @cached_property
     def model(self) -> Model:
@@ -85,7 +90,18 @@ class Quadruped(GroundTask):
     @cached_property
     def observation_space(self) -> spaces.Box:
         """Velocities, directions, angles and the last action."""
-        return spaces.Box(-LARGEST, LARGEST, (self.observation_size,), dtype=np.float32)
+        size = self.observation_size + 3 * len(self.contact_links)
+        return spaces.Box(-LARGEST, LARGEST, (size,), dtype=np.float32)
+
+    @property
+    def contact_links(self) -> tuple[str, ...]:
+        """The feet, if observations have their contact forces."""
+        return FEET if self.foot_forces else ()
+
+    @cached_property
+    def weight(self) -> float:
+        """Weight of the robot [N]."""
+        return self.model.total_mass * float(np.linalg.norm(self.model.gravity))
 
     @property
     def observation_names(self) -> tuple[str, ...]:
@@ -98,6 +114,7 @@ class Quadruped(GroundTask):
             *(f"{joint} angle" for joint in joints),
             *(f"{joint} velocity" for joint in joints),
             *(f"{joint} last action" for joint in joints),
+            *(name for link in self.contact_links for name in component_names(f"{link} force")),
         )
 
     @cached_property
@@ -129,19 +146,22 @@ class Quadruped(GroundTask):
         v = disturbance * _between(-0.3, 0.3, random[4 + joints : 4 + joints + nv])
         return State(q, v, np.zeros(2 * joints))
 
-    def targets(self, state: State, action: Array) -> Array:
+    def targets(self, state: GroundState, action: Array) -> Array:
         """Return the target angles."""
         return target_angles(action)
 
-    def remember(self, state: State, action: Array) -> Array:
+    def remember(self, state: GroundState, action: Array) -> Array:
         """Return the last two actions, and what follows them."""
         n = len(POSTURE)
         return np.concatenate([action, state.memory[:n], state.memory[2 * n :]])
 
-    def observe(self, state: State) -> Array:
-        """Return velocities and gravity in the axes of the trunk, joints, and the last action."""
+    def observe(self, state: GroundState) -> Array:
+        """Return velocities and gravity in the axes of the trunk, joints, the last action, and foot
+        forces."""
         q, v, memory = state
         parts = [v[:6], -vertical_axis(q), q[7:] - np.array(POSTURE), v[6:], memory[: len(POSTURE)]]
+        if self.foot_forces:
+            parts.append((state.forces @ rotation_from_quat(q[3:7]) / self.weight).ravel())
         return np.asanyarray(np.minimum(np.maximum(np.concatenate(parts), -LARGEST), LARGEST))
 
     def require_disturbance(self, disturbance: float) -> None:
@@ -151,7 +171,7 @@ class Quadruped(GroundTask):
                 f"disturbance is {shown(disturbance)}; wanted a number from 0 to {MAX_DISTURBANCE:g}"
             )
 
-    def costs(self, state: State) -> Any:
+    def costs(self, state: GroundState) -> Any:
         """Return the costs of motor power [W] and of changes of the action."""
         q, v, memory = state
         n = len(POSTURE)
@@ -161,7 +181,7 @@ class Quadruped(GroundTask):
         change = action - action_before
         return 2e-4 * np.sum(np.abs(torque * v[6:])) + 0.01 * np.sum(change * change)
 
-    def is_over(self, state: State) -> Any:
+    def is_over(self, state: GroundState) -> Any:
         """Check whether the trunk is too low, or leans too far."""
         q = state.q
         return (q[2] < LEAST_HEIGHT) | (vertical_axis(q)[2] < LEAST_UPRIGHT)

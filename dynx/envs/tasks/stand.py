@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.envs.ground_task import GroundState
 from dynx.envs.task import State
 from dynx.envs.tasks.quadruped import SPEED_WIDTH, STAND_HEIGHT, Quadruped, vertical_axis, with_floor
 from dynx.spatial.scalar import Array
@@ -34,7 +35,7 @@ class Stand(Quadruped):
         task."""
         return self.near_posture(random, self.disturbance if disturbance is None else disturbance)
 
-    def terms(self, before: State, action: Array, after: State) -> Mapping[str, Any]:
+    def terms(self, before: GroundState, action: Array, after: GroundState) -> Mapping[str, Any]:
         """Return the terms of the posture and the costs, and what makes a negative sum zero."""
         q, v, _ = after
         posture = vertical_axis(q)[2] * np.exp(-((q[2] - STAND_HEIGHT) ** 2) / 0.01)

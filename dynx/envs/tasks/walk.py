@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dynx.envs.ground_task import GroundState
 from dynx.envs.task import State, component_names
 from dynx.envs.tasks.quadruped import POSTURE, SPEED_WIDTH, Quadruped, vertical_axis, with_floor
 from dynx.errors import ArgumentError, shown
@@ -22,7 +23,7 @@ WANTED = slice(2 * len(POSTURE), None)
 class Walk(Quadruped):
     """Walk with a velocity that each episode draws.
 
-    Action and observation are those of `Quadruped`; the observation ends with the wanted velocity (48,):
+    Action and observation are those of `Quadruped`; the observation ends with the wanted velocity:
     forward and to the left [m/s], and the yaw rate [rad/s], in the axes of the trunk. Reward:
     exp(-error^2 / 0.25) of the velocity, half of that of the yaw rate, less vertical motion, roll and pitch
     rates, a leaning trunk, motor power and changes of the action, but not below 0. ``reset(options={
@@ -58,11 +59,11 @@ class Walk(Quadruped):
         """Names of the entries of the observation."""
         return (*super().observation_names, *component_names("wanted velocity", ("x", "y", "yaw")))
 
-    def observe(self, state: State) -> Array:
+    def observe(self, state: GroundState) -> Array:
         """Return the observation of `Quadruped`, and the wanted velocity."""
         return np.concatenate([super().observe(state), state.memory[WANTED]])
 
-    def terms(self, before: State, action: Array, after: State) -> Mapping[str, Any]:
+    def terms(self, before: GroundState, action: Array, after: GroundState) -> Mapping[str, Any]:
         """Return the terms of the velocity and the costs, and what makes a negative sum zero.
 
         Were rewards negative, a policy that does not walk yet would earn more by falling, which ends them.
@@ -82,7 +83,7 @@ class Walk(Quadruped):
             }
         )
 
-    def describe(self, state: State) -> dict[str, Any]:
+    def describe(self, state: GroundState) -> dict[str, Any]:
         """Return the wanted ``velocity`` (3,)."""
         return {"velocity": np.array(state.memory[WANTED], dtype=np.float64)}
 
