@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 from dynx.model.elements import (
-    Actuator,
     Frame,
     Inertial,
     Joint,
@@ -43,9 +42,10 @@ __all__ = [
 # Hidden from type checkers, which would take any name for an attribute.
 if not TYPE_CHECKING:
     _PLACES = {"StatedEquality": "equalities", "StatedGravityCompensation": "gravity_compensation"}
-    _PLACES |= {"StatedSensor": "sensors", "StatedTendon": "tendons"}
+    _PLACES |= {"Actuator": "actuators", "StatedSensor": "sensors", "StatedTendon": "tendons"}
     __getattr__ = moved_names(__name__, {}, {name: f"dynx.model.{at}" for name, at in _PLACES.items()})
 else:
+    from dynx.model.actuators import Actuator
     from dynx.model.equalities import StatedEquality
     from dynx.model.gravity_compensation import StatedGravityCompensation
     from dynx.model.sensors import StatedSensor

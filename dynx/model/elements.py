@@ -24,6 +24,7 @@ from dynx.model.numbers import (
     checked_vector,
     real_array,
 )
+from dynx.registry import door
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy, rpy_from_rotation
@@ -59,10 +60,9 @@ def matrix_of_pair(pose: Any, name: str) -> Any:
     try:
         np.broadcast_shapes(position.shape[:-1], quat_xyzw.shape[:-1])
     except ValueError:
-        raise ShapeError(
-            f"{name} has positions of shape {position.shape} and quaternions of shape {quat_xyzw.shape}, "
-            "whose leading axes do not broadcast"
-        ) from None
+        from dynx.model.pose_errors import refuse_pair
+
+        refuse_pair(name, position, quat_xyzw)
     return homogeneous(rotation_from_quat(checked_quaternion(name, quat_xyzw)), position)
 
 
@@ -94,12 +94,9 @@ def rigid_matrix(T: ArrayLike, name: str) -> Floats:
             f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4), or a position and a quaternion"
         ) from None
     if array.shape != (4, 4):
-        position = ", ".join(f"{x:g}" for x in array.tolist()) if array.shape == (3,) else None
-        hint = f", such as Pose(({position}))" if position is not None else ""
-        raise ShapeError(
-            f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4){hint}, or a pair of position "
-            "and quaternion (x, y, z, w)"
-        )
+        from dynx.model.pose_errors import refuse_matrix
+
+        refuse_matrix(name, array)
     rows: list[list[float]] = array.tolist()
     if not all(map(math.isfinite, chain.from_iterable(rows))):
         raise NotFiniteError(f"{name} has an entry that is NaN or infinite; wanted finite numbers")
@@ -169,6 +166,18 @@ class Inertial:
     iyz: float = 0.0
     izz: float = 0.0
     line: int | None = field(default=None, compare=False)
+
+    @door("dynx.model.replaced_inertials:inertial_from_parameters")
+    @classmethod
+    def from_parameters(cls, parameters: ArrayLike) -> Inertial:
+        """Return the inertial that has ten inertial parameters (10,): m [kg], m cx, m cy, m cz [kg m], Ixx,
+        Ixy, Ixz, Iyy, Iyz, Izz [kg m^2].
+
+        First moments and tensor are about the origin of the link frame, in its axes. The order is that of the
+        columns of `Backend.inertial_regressor`, and of `dynx.inertial_parameters`. The numbers are used as
+        they are, also those that no body has. Raises ArgumentError for first moments without a mass.
+        """
+        raise NotImplementedError
 
     @property
     def tensor(self) -> Floats:
@@ -326,28 +335,6 @@ class Joint:
     def unit(self) -> Literal["rad", "m"]:
         """Unit of the position."""
         return "m" if self.type == "prismatic" else "rad"
-
-
-@dataclass(frozen=True)
-class Actuator:
-    """Actuator of a joint or tendon, as a robot description states it. It is data: dynx applies no actuator.
-
-    With the command u, and the position q and velocity v of the joint, the force is
-    ``f = gain u + bias[0] + bias[1] gear q + bias[2] gear v``, and the effort is ``gear f`` [N m or N], as in
-    MuJoCo. MuJoCo limits u to `control_range` and f to `force_range`. `name` may be empty. If the actuator
-    acts on a `tendon`, `joint` is empty, and q, v and the effort are those of the tendon: length, velocity
-    and tension.
-    """
-
-    name: str
-    joint: str
-    gear: float = 1.0
-    gain: float = 1.0
-    bias: Vector = ZERO
-    control_range: tuple[float, float] = (-INFINITY, INFINITY)
-    force_range: tuple[float, float] = (-INFINITY, INFINITY)
-    line: int | None = field(default=None, compare=False)
-    tendon: str = ""
 
 
 @dataclass(frozen=True)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.model import configuration, topology
-from dynx.model.elements import IDENTITY, Actuator, Joint, Link, Note, Pose, checked_pose
+from dynx.model.elements import IDENTITY, Inertial, Joint, Link, Note, Pose, checked_pose
 from dynx.model.geometry.links import ContactFilter, Geometry
 from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.model.numbers import checked_gravity
@@ -20,7 +20,10 @@ from dynx.model.package_search import StrPath
 from dynx.model.topology import refuse_unbounded_numbers
 from dynx.model.tree import NO_GEOMETRY, STANDARD_GRAVITY, Base, Tree, checked_base
 from dynx.registry import door, explains_names
-from dynx.spatial.scalar import longdouble
+from dynx.spatial.scalar import Floats, longdouble
+
+if TYPE_CHECKING:
+    from dynx.model.actuators import Actuator
 
 
 @explains_names
@@ -39,7 +42,8 @@ class Model(Tree):
 
     `geometry` has the visual and collision shapes of the links, `contact_filter` the shapes that may touch,
     and `configurations` the named configurations. `actuators`, `sensors`, `tendons`, `equalities` and
-    `gravity_compensation` are data. None of these fields affects the dynamics, and `==` ignores them.
+    `gravity_compensation` are data. None of these fields affects the dynamics, and `==` ignores them;
+    `actuator_forces` computes the torques of the actuators.
 
     Models are immutable. You can compare them by content (`==`), hash and pickle them.
     """
@@ -72,7 +76,7 @@ class Model(Tree):
         ordered_joints = topology.lock_joints(ordered_joints, lock or {})
         ordered_joints = topology.resolve_mimics(ordered_joints, notes, source)
         refuse_unbounded_numbers(ordered_links, ordered_joints, source)
-        notes += _missing_inertial_notes(ordered_links, ordered_joints)
+        notes += missing_inertial_notes(ordered_links, ordered_joints)
         return cls(
             name=name,
             links=tuple(ordered_links),
@@ -94,6 +98,20 @@ class Model(Tree):
     integrate = configuration.integrate
     difference = configuration.difference
     clip = configuration.clip
+
+    @door("dynx.model.actuation:actuator_forces")
+    def actuator_forces(self, ctrl: ArrayLike, q: ArrayLike, v: ArrayLike) -> Floats:
+        """Return the generalised force tau (..., nv) of `actuators` for the commands `ctrl` (..., nu).
+
+        It is MuJoCo's ``qfrc_actuator`` in the state q (..., nq), v (..., nv), in the coordinates of dynx.
+        Each command has the unit of its actuator. Commands, forces of actuators, the sum of the forces on a
+        tendon, and the efforts of joints are limited as in MuJoCo. The methods of your own task or controller
+        may call this function in compiled code, too. Muscles, and actuators with a state of their own or on a
+        site or body, are not among `actuators`: `notes` names them.
+
+        Raises ArgumentError for a robot whose description is not in MJCF.
+        """
+        raise NotImplementedError
 
     # -- other forms -------------------------------------------------------------------------
 
@@ -155,6 +173,15 @@ class Model(Tree):
     def with_gravity(self, gravity: ArrayLike) -> Model:
         """Return the same robot with another gravity (3,) [m/s^2]."""
         return replace(self, gravity=checked_gravity(gravity))
+
+    @door("dynx.model.replaced_inertials:with_inertials")
+    def with_inertials(self, inertials: Mapping[str, Inertial]) -> Model:
+        """Return the same robot with other inertials of the links named, such as identified ones.
+
+        `Inertial.from_parameters` makes an inertial of the ten parameters of a link. Inertials that no body
+        has are used as they are, with a note. Raises UnknownNameError for an unknown link.
+        """
+        raise NotImplementedError
 
     @door("dynx.model.added_frames:with_frame")
     def with_frame(self, name: str, link: str, placement: Pose | ArrayLike = IDENTITY) -> Model:
@@ -228,7 +255,7 @@ def refuse_other_than_model(model: object) -> None:
         )
 
 
-def _missing_inertial_notes(links: Iterable[Link], joints: Iterable[Joint]) -> list[Note]:
+def missing_inertial_notes(links: Iterable[Link], joints: Iterable[Joint]) -> list[Note]:
     """Return a note for each moving link without an inertial; some engines give it a mass of 1 kg."""
     moved = {joint.child: joint.name for joint in joints if joint.moves}
     return [

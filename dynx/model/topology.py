@@ -19,7 +19,7 @@ from dynx.errors import (
     shown,
 )
 from dynx.model.elements import Inertial, Joint, Link, Mimic, Note, Pose
-from dynx.model.numbers import MAX_MAGNITUDE
+from dynx.model.numbers import MAX_MAGNITUDE, is_real
 from dynx.spatial.so3 import rotation_about, rpy_from_rotation
 
 # Bound on the numbers of a description, whether a file or a program states them.
@@ -29,8 +29,8 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def refuse_unbounded_numbers(links: Iterable[Link], joints: Iterable[Joint], source: str) -> None:
-    """Raise DescriptionError for a number that is not finite or not below `MAX_MAGNITUDE`, and
-    UnsupportedFeatureError for a ball joint with a spring.
+    """Raise DescriptionError for a number that is not finite or not below `MAX_MAGNITUDE`, DTypeError for
+    what is no number, and UnsupportedFeatureError for a ball joint with a spring.
 
     Limits may be infinite, and are not part of any product.
     """
@@ -39,20 +39,10 @@ def refuse_unbounded_numbers(links: Iterable[Link], joints: Iterable[Joint], sou
             _require_bounded(f"link {shown(link.name)}", _of_inertial(link.inertial), source, link.line)
     for joint in joints:
         _require_bounded(f"joint {shown(joint.name)}", _of_joint(joint), source, joint.line)
-        if joint.type == "ball" and not joint.limits.upper >= 0.0:
-            raise DescriptionError(
-                f"the largest angle of ball joint {shown(joint.name)} is {joint.limits.upper}; wanted at "
-                "least 0",
-                source=source,
-                line=joint.line,
-            )
-        if joint.type == "ball" and joint.dynamics.stiffness:
-            raise UnsupportedFeatureError(
-                f"ball joint {shown(joint.name)} has a spring of {joint.dynamics.stiffness:g} N m/rad; ball "
-                "joints have none in dynx",
-                source=source,
-                line=joint.line,
-            )
+        if joint.type == "ball" and (joint.dynamics.stiffness or not joint.limits.upper >= 0.0):
+            from dynx.model.ball_joint_errors import refuse_numbers
+
+            refuse_numbers(joint, source)
 
 
 def _of_inertial(inertial: Inertial) -> Iterator[tuple[str, float]]:
@@ -83,6 +73,8 @@ def _of_pose(name: str, pose: Pose) -> Iterator[tuple[str, float]]:
 
 def _require_bounded(what: str, numbers: Iterable[tuple[str, float]], source: str, line: int | None) -> None:
     for name, value in numbers:
+        if not is_real(value):
+            raise DTypeError(f"the {name} of {what} is {shown(value)}; wanted a number")
         # The comparison is false for NaN.
         if not abs(value) < MAX_MAGNITUDE:
             raise DescriptionError(

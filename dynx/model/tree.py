@@ -13,7 +13,6 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model.elements import (
     IDENTITY,
-    Actuator,
     Frame,
     Inertial,
     Joint,
@@ -28,6 +27,7 @@ from dynx.registry import door
 from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
+    from dynx.model.actuators import Actuator
     from dynx.model.equalities import StatedEquality
     from dynx.model.gravity_compensation import StatedGravityCompensation
     from dynx.model.sensors import StatedSensor

@@ -340,8 +340,7 @@ def _free(name: str, taken: set[str]) -> str:
 
 def _payload(frame: str, inertia: RigidInertia) -> Payload:
     """Return a body with an inertia about the origin of a frame."""
-    mass, moment = float(inertia.mass), np.asarray(inertia.first_moment, dtype=np.float64)
-    center = moment / mass if mass else np.zeros(3)
-    C = skew(center)
-    tensor = np.asarray(inertia.rotational_inertia, dtype=np.float64) + mass * (C @ C)
-    return Payload(frame, mass, tuple(center.tolist()), 0.5 * (tensor + tensor.T))
+    from dynx.model.replaced_inertials import central_inertia  # most robots have no payload of ten parameters
+
+    center, tensor = central_inertia(inertia)
+    return Payload(frame, float(inertia.mass), tuple(center.tolist()), tensor)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from itertools import product
 
 from dynx.model import Model
-from dynx.model.elements import INFINITY, ZERO, Actuator, Joint
+from dynx.model.actuators import Actuator
+from dynx.model.elements import INFINITY, ZERO, Joint
 from dynx.model.geometry.links import ContactFilter, ShapeNumber
 from dynx.model.mechanism import ROOT
 from dynx.model.tendons import StatedTendon

@@ -1,4 +1,4 @@
-"""Actuators of MJCF that act on one joint or tendon, in the terms of `dynx.model.elements.Actuator`.
+"""Actuators of MJCF that act on one joint or tendon, in the terms of `dynx.model.actuators.Actuator`.
 
 The shortcuts ``motor``, ``position`` and ``velocity`` are written by MuJoCo as a ``general`` actuator, and
 so they are here. Taken are fixed gains and affine biases without a state of their own.
@@ -11,7 +11,8 @@ from xml.etree.ElementTree import Element as Written
 from xml.etree.ElementTree import SubElement
 
 from dynx.errors import escaped, shown
-from dynx.model.elements import INFINITY, ZERO, Actuator, Joint, Vector
+from dynx.model.actuators import Actuator
+from dynx.model.elements import INFINITY, ZERO, Joint, Vector
 from dynx.model.mjcf.attributes import UNLIMITED, text
 from dynx.model.mjcf.document import ACTUATORS, MjcfText
 from dynx.model.xml.reading import Element
@@ -92,6 +93,8 @@ def _actuator(
         if tendon:
             raise NotTakenError("has an inheritrange, and acts on a tendon")
         ranges[0] = _inherited(reading.number(element, "inheritrange", what), joints[on], ranges[0])
+    if document.options.disabled("clampctrl") is not None:
+        ranges[0] = UNBOUNDED
     return Actuator(given.get("name", ""), on, gear, gain, bias, ranges[0], ranges[1], element.line, tendon)
 
 

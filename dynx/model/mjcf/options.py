@@ -1,6 +1,7 @@
 """Options of MJCF: ``<option>`` and its flags, those that change the robot apart from those of MuJoCo's step.
 
-Flags that remove gravity, damping, dry friction, springs, contacts or equality constraints have their effect.
+Flags that remove gravity, damping, dry friction, springs, actuators and their control ranges, contacts or
+equality constraints have their effect.
 Each other one that a file states has a note.
 """
 
@@ -23,6 +24,8 @@ _PARTS_OF = {
 
 _OF_ROBOTS = frozenset(
     [
+        "actuation",
+        "clampctrl",
         "constraint",
         "contact",
         "damper",
@@ -38,9 +41,7 @@ _OF_ROBOTS = frozenset(
 )
 _ENABLED_AT_FIRST = frozenset(
     [
-        "actuation",
         "autoreset",
-        "clampctrl",
         "eulerdamp",
         "island",
         "midphase",
@@ -122,12 +123,19 @@ class MjcfOptions:
             ("damper", "dampers are disabled: no joint has damping"),
             ("spring", "springs are disabled: no joint has a spring"),
             ("frictionloss", "dry friction is disabled: no joint has friction"),
+            ("actuation", "actuators are disabled, and none is read"),
+            ("clampctrl", "controls are not limited: no actuator has a range of its control"),
             ("limit", "limits are disabled in MuJoCo; the joints have theirs all the same"),
             *(() if scene else _OF_ONE_ROBOT.items()),
         ):
             element = self.disabled(flag)
             if element is not None:
                 reading.note(element, f"<flag>: {effect}")
+        if "actuatorgroupdisable" in self.settings and not scene:
+            reading.note(
+                self.settings["actuatorgroupdisable"],
+                "actuatorgroupdisable is not read: model.actuators also has the actuators of these groups",
+            )
         enabled, element = self.flags.get("override", (False, None))
         if enabled and element is not None:
             reading.note(element, "<flag>: override is not read; contacts have the parameters of their geoms")

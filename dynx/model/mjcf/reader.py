@@ -18,10 +18,10 @@ from typing import NamedTuple
 import numpy as np
 
 from dynx.errors import escaped, nearest, shown
+from dynx.model.actuators import Actuator
 from dynx.model.elements import (
     IDENTITY,
     INFINITY,
-    Actuator,
     Frame,
     Inertial,
     Joint,
@@ -93,7 +93,7 @@ _IN_BODY = (
 )
 _NOT_READ_OF_BODIES = {"gravcomp": "weight is not compensated", "mocap": "it is fixed"}
 _NOT_IN_TREE = {
-    "actuator": "no motor is read, and so no range of a motor",
+    "actuator": "dynx does not compute them",
     "sensor": "no sensor is read",
     "tendon": "no tendon pulls",
     "equality": "the loops that they close stay open, and joints that they couple move freely",
@@ -102,7 +102,7 @@ _NOT_IN_TREE = {
     "keyframe": "no configuration of it is read",
     "extension": "no plug-in is used",
 }
-_OF_SCENES = ("equality", "contact", "keyframe")
+_OF_SCENES = ("actuator", "contact", "equality", "keyframe", "tendon")
 """Sections that a scene reads."""
 _OF_ONE_ROBOT = ("actuator", "contact", "equality", "keyframe", "sensor", "tendon")
 """Sections that are read of one robot, as data."""
@@ -264,8 +264,8 @@ class _TreeReader:
         self._read_mimics()
         self._require_joints_of_motors(root)
         self._scale(self._total_mass_scale(root, self._parts.links))
-        tendons = self._read_tendons()
-        actuators, contact_filter = self._read_actuators(tendons), self._contact_filter()
+        tendons = self._read_tendons(self._parts.joints)
+        actuators, contact_filter = self._read_actuators(self._parts.joints, tendons), self._contact_filter()
         configurations = self._read_configurations(base)
         self._note_compensation()
         self._note_vocabulary(root)
@@ -302,17 +302,19 @@ class _TreeReader:
             trees.append((parts, free))
             sites = [*sites, *parts.sites]
         scale = self._total_mass_scale(root, [link for parts, _ in trees for link in parts.links])
+        self._require_joints_of_motors(root)
+        driven = self._read_drives([parts.joints for parts, _ in trees])
         found = []
-        for parts, free in trees:
+        for (parts, free), (tendons, actuators) in zip(trees, driven, strict=True):
             self._parts = parts
             self._scale(scale)
             first = parts.bodies[0]
             description = self._description(first.name, "floating" if free else "fixed", gravity, [])
+            description = replace(description, actuators=actuators, tendons=tendons)
             if not free and not first.jointed:
                 description = replace(description, base_pose=Pose.from_matrix(first.T_world_body))
             positions = tuple(parts.positions)
             found.append(MjcfTree(description, tuple(parts.bodies), free, positions, parts.aligned))
-        self._require_joints_of_motors(root)
         require_objects(self._document)
         self._note_vocabulary(root)
         self._note_counts(root)
@@ -754,19 +756,45 @@ class _TreeReader:
                         f"{nearest(name, known)}",
                     )
 
-    def _read_actuators(self, tendons: Iterable[StatedTendon]) -> tuple[Actuator, ...]:
-        """Return the actuators of the robot, with notes on all of them: none acts."""
-        joints = {each.name: each for each in self._parts.joints}
-        taken, left = read_actuators(self._document, joints, {each.name for each in tendons if each.name})
-        self._note_data("actuator", "none acts on a robot in dynx", taken, left, _NOT_IN_TREE["actuator"])
+    def _read_actuators(
+        self, joints: Iterable[Joint], tendons: Iterable[StatedTendon]
+    ) -> tuple[Actuator, ...]:
+        """Return the actuators on these joints and tendons, with notes on all of them."""
+        if self._document.options.disabled("actuation") is not None:
+            return ()
+        named = {each.name: each for each in joints}
+        taken, left = read_actuators(self._document, named, {each.name for each in tendons if each.name})
+        effect = "model.actuator_forces(ctrl, q, v) computes their torques, which World.step takes"
+        self._note_data("actuator", effect, taken, left, _NOT_IN_TREE["actuator"])
         return taken
 
-    def _read_tendons(self) -> tuple[StatedTendon, ...]:
-        """Return the fixed tendons of the robot, with notes on all of them: none pulls."""
-        joints = {each.name: each for each in self._parts.joints}
-        taken, left = read_tendons(self._document, joints, self._spring_references)
+    def _read_tendons(self, joints: Iterable[Joint]) -> tuple[StatedTendon, ...]:
+        """Return the fixed tendons of these joints, with notes on all of them: none pulls."""
+        named = {each.name: each for each in joints}
+        taken, left = read_tendons(self._document, named, self._spring_references)
         self._note_data("tendon", "no tendon pulls in dynx", taken, left)
         return taken
+
+    def _read_drives(
+        self, trees: Sequence[Sequence[Joint]]
+    ) -> list[tuple[tuple[StatedTendon, ...], tuple[Actuator, ...]]]:
+        """Return the fixed tendons and the actuators of each tree, which is given by its joints."""
+        joints = [joint for own in trees for joint in own]
+        tree_of = {joint.name: number for number, own in enumerate(trees) for joint in own}
+        tendons: dict[int, list[StatedTendon]] = {number: [] for number in range(len(trees))}
+        for each in self._read_tendons(joints):
+            several = {tree_of[name] for name in each.joints}
+            if len(several) > 1:
+                text = f"not read: tendon {shown(each.name)}, which has joints of several robots"
+                self._reading.notes.append(_note_on_line(text, each.line))
+            else:
+                tendons[several.pop()].append(each)
+        tree_of_tendon = {each.name: number for number, own in tendons.items() for each in own}
+        actuators: dict[int, list[Actuator]] = {number: [] for number in tendons}
+        for drive in self._read_actuators(joints, [each for own in tendons.values() for each in own]):
+            number = tree_of_tendon[drive.tendon] if drive.tendon else tree_of[drive.joint]
+            actuators[number].append(drive)
+        return [(tuple(tendons[number]), tuple(actuators[number])) for number in tendons]
 
     def _read_equalities(
         self, tendons: Iterable[StatedTendon], frames: Iterable[Frame]
@@ -818,7 +846,10 @@ class _TreeReader:
             self._reading.notes.append(_note_on_line(text, taken[0].line))
         if left:
             (element, reason), count = left[0], _counted(len(left), "element")
-            text = f"not read: {count} of <{tag}>; {effect_of_left or effect}"
+            names = [shown(each.attributes["name"]) for each, _ in left if each.attributes.get("name")]
+            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+            called = f" ({', '.join(names[:3])}{more})" if names else ""
+            text = f"not read: {count} of <{tag}>{called}; {effect_of_left or effect}"
             self._reading.note(element, f"{text} (the first is left out because {reason})")
 
     def _read_sensors(self, content: Description) -> tuple[StatedSensor, ...]:

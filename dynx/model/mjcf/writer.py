@@ -21,7 +21,8 @@ import numpy as np
 
 from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, UnsupportedFeatureError, shown
-from dynx.model.elements import IDENTITY, ZERO, Actuator, Inertial, Joint, Limits, Link, Mimic, Pose
+from dynx.model.actuators import Actuator
+from dynx.model.elements import IDENTITY, ZERO, Inertial, Joint, Limits, Link, Mimic, Pose
 from dynx.model.geometry import (
     Appearance,
     Collision,

@@ -134,6 +134,9 @@ def _without_prefix(tree: MjcfTree, prefix: str) -> MjcfTree:
         joints=[shorter(joint) for joint in content.joints],
         frames=[Frame(short(each.name), short(each.link), each.placement) for each in content.frames],
         geometry=Geometry({short(name): each for name, each in content.geometry.links.items()}),
+        actuators=tuple(
+            replace(each, name=short(each.name), joint=short(each.joint)) for each in content.actuators or ()
+        ),
     )
     return replace(
         tree,
