@@ -126,6 +126,9 @@ PYBULLET = {
 _LOCAL = "for `pin.LOCAL`"
 
 PINOCCHIO = {
+    "FromDynamicParameters": "`dynx.model.Inertial.from_parameters(parameters)`, for "
+    "Model.with_inertials({link: inertial}); the parameters have another order",
+    "SE3": "a pose (4, 4), such as `dynx.Pose(xyz, rpy).matrix`",
     "RobotWrapper": "dynx.backend('pinocchio', dynx.load(path))",
     "buildModelFromUrdf": _LOADED,
     "buildModelsFromUrdf": _LOADED,
@@ -149,6 +152,7 @@ PINOCCHIO = {
     ),
     "computeTotalMass": "Model.total_mass",
     "difference": "Model.difference(q0, q1)",
+    "exp6": "Model.integrate(q, v) moves a floating base along the exponential of its twist",
     "forwardKinematics": "Backend.forward_kinematics(q, frame)",
     "getFrameId": "no such call, because calls of dynx take the name of a frame; Model.frame_names lists the "
     "names",
@@ -163,17 +167,27 @@ PINOCCHIO = {
     "getJointJacobian": "Backend.jacobian(q, link, reference='local') for the child link of the joint and "
     "`pin.LOCAL`",
     "integrate": "Model.integrate(q, v)",
+    "log3": "`scipy.spatial.transform.Rotation.from_matrix(R).as_rotvec()`",
+    "log6": "Model.difference(q0, q1), whose first six entries are `log6(T0.inverse() * T1)` for two poses "
+    "T0 and T1 of a floating base",
     "neutral": "Model.neutral()",
     "randomConfiguration": "Model.random(rng)",
+    "toDynamicParameters": "dynx.inertial_parameters(model), ten numbers per link in another order",
     "updateFramePlacement": "Backend.forward_kinematics(q, frame)",
     "updateFramePlacements": "Backend.forward_kinematics(q)",
 }
 """Functions of Pinocchio, besides those of quantities."""
 
+_FIXED = "no such call, because a mocap body is fixed in a Scene; World.set_state(...) moves a free body"
+_FORCES_OF_ACTUATORS = "Model.actuator_forces(ctrl, q, v)"
+
 MUJOCO = {
     "MjData": "World(scene, engine='mujoco'), whose state is World.state",
     "MjModel": f"{_LOADED} for a robot; for a scene World(scene, engine='mujoco'), where `scene` is "
     "dynx.world.read_scene(path)",
+    "actuator": "Model.actuators, which have names, gears, gains, biases and ranges",
+    "ctrl": f"{_FORCES_OF_ACTUATORS}, for World.step(torques={{robot: tau}}) or the method `torque` of a "
+    "controller or task",
     "mj_applyFT": _FORCE,
     "mj_contactForce": "World.contacts(part), which returns contacts with their forces",
     "mj_crb": _WITH_ARMATURE,
@@ -196,8 +210,18 @@ MUJOCO = {
     "mj_step": "World.step()",
     "mj_step1": _WHOLE_STEP,
     "mj_step2": _WHOLE_STEP,
+    "mocap_pos": _FIXED,
+    "mocap_quat": _FIXED,
+    "nu": "`len(Model.actuators)`",
+    "qfrc_actuator": _FORCES_OF_ACTUATORS,
+    "qfrc_applied": "World.step(torques={robot: tau})",
+    "qpos": f"{_POSITIONS}; {_SET_STATE}",
+    "qvel": f"{_VELOCITIES}; {_SET_STATE}",
+    "sensordata": "World.read_sensors(), which reads Scene(sensors=...); Model.sensors has those of the file "
+    "as data",
+    "xfrc_applied": _FORCE,
 }
-"""Functions and classes of MuJoCo, besides those of quantities."""
+"""Functions, classes and arrays of MuJoCo, besides those of quantities."""
 
 DRAKE = {
     "AdvanceTo": "World.run(duration)",
@@ -220,6 +244,8 @@ DRAKE = {
     "GetJointByName": _JOINT_LIMITS,
     "GetPositions": _POSITIONS,
     "GetVelocities": _VELOCITIES,
+    "InverseDynamicsController": "dynx.control.ComputedTorque(model, kp=kp, kd=kd), which has no "
+    "integral gain",
     "InverseKinematics": "Backend.inverse_kinematics(pose, frame)",
     "MultibodyPlant": "dynx.backend('drake', model) for its dynamics, or World(scene, engine='drake')",
     "SetPositions": _SET_STATE,
@@ -249,9 +275,12 @@ ROBOTICSTOOLBOX = {
     "jacob0_dot": "Backend.jacobian_derivative(q, v, frame)",
     "jacobe": "Backend.jacobian(q, frame, reference='local')",
     "jtraj": "dynx.trajectory.quintic(q0, q1, duration)",
+    "manipulability": "`numpy.prod(numpy.linalg.svd(J)[1])` with J = Backend.jacobian(q, frame)",
     "mstraj": "dynx.trajectory.spline(...) or dynx.trajectory.time_optimal_path(...)",
     "mtraj": "dynx.trajectory.quintic(q0, q1, duration), or "
     "dynx.trajectory.trapezoidal(q0, q1, velocity=..., acceleration=...)",
+    "p_servo": "Backend.velocity_ik(q, dynx.ik.velocity.VelocityTask(frame, target=T, gain=gain), dt=dt), "
+    "which returns the velocities of the joints",
     "qlim": "Model.lower and Model.upper",
     "rne": "Backend.inverse_dynamics(q, v, a)",
     "teach": "Model.view(), a page with a slider for each joint",

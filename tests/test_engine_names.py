@@ -23,13 +23,14 @@ from dynx.world import Scene, World, box
 
 PLACES: dict[str, tuple[str, ...]] = {
     "PyBullet": ("pybullet",),
-    "Pinocchio": ("pinocchio", "pinocchio:Model"),
-    "MuJoCo": ("mujoco",),
+    "Pinocchio": ("pinocchio", "pinocchio:Model", "pinocchio:Inertia"),
+    "MuJoCo": ("mujoco", "mujoco:MjData", "mujoco:MjModel"),
     "Drake": (
         "pydrake.multibody.plant:MultibodyPlant",
         "pydrake.multibody.plant",
         "pydrake.multibody.tree:Frame",
         "pydrake.multibody.inverse_kinematics",
+        "pydrake.systems.controllers",
         "pydrake.systems.analysis",
         "pydrake.systems.analysis:Simulator",
     ),
