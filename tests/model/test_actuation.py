@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -102,6 +103,22 @@ def test_forces_are_those_of_mujoco(text: str, seed: int) -> None:
         ctrl, np.r_[np.zeros(6), 1.0, q], np.r_[np.ones(6), v]
     )
     np.testing.assert_array_equal(floating, np.r_[np.zeros(6), own])
+
+
+GYMNASIUM = ["ant", "half_cheetah", "hopper", "humanoid", "inverted_pendulum", "pusher_v5", "reacher"]
+GYMNASIUM += ["swimmer", "walker2d_v5"]
+
+
+@pytest.mark.parametrize("name", GYMNASIUM)
+def test_forces_of_robots_of_gymnasium_are_those_of_mujoco(name: str) -> None:
+    folder = Path(str(pytest.importorskip("gymnasium").__file__)).parent / "envs/mujoco/assets"
+    text = (folder / f"{name}.xml").read_text()
+    model, engine, rng = dynx.load(text), compiled(text), np.random.default_rng(0)
+    for _ in range(5):
+        q, v, ctrl = model.random(rng), rng.normal(size=model.nv), rng.normal(size=engine.nu)
+        qpos = np.r_[q[:3], q[6], q[3:6], q[7:]] if model.floating else q
+        wanted = of_mujoco(engine, ctrl, qpos, v)
+        np.testing.assert_allclose(model.actuator_forces(ctrl, q, v), wanted, rtol=BAR)
 
 
 @given(texts(), st.integers(0, 2**32), st.floats(-1.0, 1.0))
