@@ -10,7 +10,6 @@ from dynx.model.elements import (
     Limits,
     Link,
     Mimic,
-    NamedConfiguration,
     Note,
     Pose,
 )
@@ -42,11 +41,13 @@ __all__ = [
 # Hidden from type checkers, which would take any name for an attribute.
 if not TYPE_CHECKING:
     _PLACES = {"StatedEquality": "equalities", "StatedGravityCompensation": "gravity_compensation"}
-    _PLACES |= {"Actuator": "actuators", "StatedSensor": "sensors", "StatedTendon": "tendons"}
+    _PLACES |= {"Actuator": "actuators", "NamedConfiguration": "stated_configurations"}
+    _PLACES |= {"StatedSensor": "sensors", "StatedTendon": "tendons"}
     __getattr__ = moved_names(__name__, {}, {name: f"dynx.model.{at}" for name, at in _PLACES.items()})
 else:
     from dynx.model.actuators import Actuator
     from dynx.model.equalities import StatedEquality
     from dynx.model.gravity_compensation import StatedGravityCompensation
     from dynx.model.sensors import StatedSensor
+    from dynx.model.stated_configurations import NamedConfiguration
     from dynx.model.tendons import StatedTendon

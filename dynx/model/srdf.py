@@ -15,10 +15,11 @@ import numpy as np
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, escaped, shown
 from dynx.files.reading import printable, read_file
-from dynx.model.elements import NamedConfiguration, Note
+from dynx.model.elements import Note
 from dynx.model.model import Model
 from dynx.model.numbers import checked_quaternion
 from dynx.model.package_search import StrPath
+from dynx.model.stated_configurations import NamedConfiguration
 from dynx.model.xml.reading import Element, read_xml
 from dynx.model.xml.values import Reading
 

@@ -17,7 +17,6 @@ from dynx.model.elements import (
     Inertial,
     Joint,
     Link,
-    NamedConfiguration,
     Note,
     Pose,
     Vector,
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
     from dynx.model.equalities import StatedEquality
     from dynx.model.gravity_compensation import StatedGravityCompensation
     from dynx.model.sensors import StatedSensor
+    from dynx.model.stated_configurations import NamedConfiguration
     from dynx.model.tendons import StatedTendon
 
 Base = Literal["fixed", "floating"]

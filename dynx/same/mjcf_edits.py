@@ -15,7 +15,7 @@ from xml.etree.ElementTree import tostring
 import numpy as np
 
 from dynx.model import Model
-from dynx.model.elements import Inertial, Joint, NamedConfiguration
+from dynx.model.elements import Inertial, Joint
 from dynx.model.equalities import LINEAR, StatedEquality
 from dynx.model.mjcf.document import MjcfText, turn
 from dynx.model.mjcf.equalities import EqualityWriter
@@ -29,6 +29,7 @@ from dynx.model.mjcf.tendons import (
     write_tendons,
 )
 from dynx.model.mjcf.writer import inertial_attributes
+from dynx.model.stated_configurations import NamedConfiguration
 from dynx.model.tendons import StatedTendon
 from dynx.model.xml.reading import Element
 from dynx.model.xml.several_files import file_of_line

@@ -30,7 +30,6 @@ from dynx.model.elements import (
     Limits,
     Link,
     Mimic,
-    NamedConfiguration,
     Note,
     Pose,
     Vector,
@@ -55,6 +54,7 @@ from dynx.model.mjcf.tendons import read_tendons
 from dynx.model.mjcf.vocabulary import unknown_parts, unused_attributes
 from dynx.model.package_search import StrPath
 from dynx.model.sensors import StatedSensor
+from dynx.model.stated_configurations import NamedConfiguration
 from dynx.model.tendons import StatedTendon
 from dynx.model.topology import MAX_LINKS
 from dynx.model.tree import Base, Description

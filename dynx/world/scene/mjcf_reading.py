@@ -14,7 +14,7 @@ from pathlib import PurePath
 import numpy as np
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.elements import Inertial, Mimic, NamedConfiguration, Note, Pose, Vector
+from dynx.model.elements import Inertial, Mimic, Note, Pose, Vector
 from dynx.model.geometry import LinkGeometry
 from dynx.model.loading import build_described
 from dynx.model.mjcf.keyframes import TreeState, position_and_quaternion, read_keyframes, tree_states
@@ -22,6 +22,7 @@ from dynx.model.mjcf.reader import MjcfBody, MjcfTree, MjcfTrees, read_trees
 from dynx.model.mjcf.shapes import Geom
 from dynx.model.named_configurations import coordinates_of
 from dynx.model.package_search import StrPath
+from dynx.model.stated_configurations import NamedConfiguration
 from dynx.model.xml.reading import Element
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
