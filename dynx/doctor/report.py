@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args
 from dynx._version import __version__
 from dynx.agreement.report import LoadFailure
 from dynx.argument_types import checks_types
+from dynx.errors import EngineLimitError
 from dynx.files.documents import document_of, to_json_values
 from dynx.files.pages import html_grid
 from dynx.loaded import engine_of
@@ -349,6 +350,8 @@ class DoctorReport:
         if self.error is not None:
             return f"not examined ({self.error.type}: {self.error.message})"
         refused = "" if self.refusal is None else f"dynx refuses it ({self.refusal.message}); "
+        if self.refusal is not None and self.refusal.type == EngineLimitError.__name__:
+            refused = f"engines are compared on the mended file ({self.refusal.message}); "
         skipped = f"; every engine skips {' and '.join(self.skipped)}" if self.skipped else ""
         return f"{refused}{self._verdict_on_engines}{skipped}"
 

@@ -24,6 +24,16 @@ def refuse_ball_joints_of_backend(tree: Tree, backend: str) -> None:
         raise EngineLimitError(_refusal(tree, f"the backend {shown(backend)}", BACKENDS_WITH_BALL_JOINTS))
 
 
+def refuse_ball_joints_of_urdf(tree: Tree) -> None:
+    """Raise EngineLimitError, which names the joint, if a robot of URDF, where such joints are an extension,
+    has a ball joint."""
+    if tree.ball_joints:
+        raise EngineLimitError(
+            f"{shown(tree.ball_joints[0].name)} of {tree.name} is a ball joint, with which most engines do "
+            "not load URDF"
+        )
+
+
 def _refusal(tree: Tree, what: str, instead: str) -> str:
     joint = tree.ball_joints[0].name
     clause = f"; {instead}" if instead else ""

@@ -48,9 +48,10 @@ def load(
       mark;
     - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro, .xml, .mjcf,
       .sdf or .world. Such a string is never the name of a robot. If the file does not exist, dynx searches
-      the package ``pybullet_data``, as PyBullet does, for example for ``plane.urdf``. A .xacro file needs the
-      extra ``xacro``, which evaluates expressions of the file as Python code: expand only files that you
-      trust. Arguments of a xacro file follow its path: ``"ur.urdf.xacro name:=ur ur_type:=ur5e"``;
+      the package ``pybullet_data``, as PyBullet does, for example for ``plane.urdf`` or ``mjcf/ant.xml``. A
+      .xacro file needs the extra ``xacro``, which evaluates expressions of the file as Python code: expand
+      only files that you trust. Arguments of a xacro file follow its path:
+      ``"ur.urdf.xacro name:=ur ur_type:=ur5e"``;
     - ``package://NAME/FILE``: a file of a package in `package_dirs`, in ROS_PACKAGE_PATH or
       AMENT_PREFIX_PATH, or of the Python package ``pybullet_data``; never one outside the package;
     - the name of a robot in the library (see ``dynx robots``). For a file of this name in the working

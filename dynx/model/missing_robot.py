@@ -11,16 +11,20 @@ from pathlib import Path, PurePath
 from dynx.errors import nearest, shown
 from dynx.model.package_search import data_folders
 
+_DESCRIPTIONS = (".urdf", ".sdf", ".world", ".xml", ".mjcf")
+"""Suffixes of descriptions that need no program to be read, unlike xacro."""
+
 
 def in_data_package(name: str) -> Path | None:
-    """Return the URDF file of a Python package of data (``pybullet_data``) that is called `name` there, as
-    ``plane.urdf``, ``kuka_iiwa/model.urdf`` or ``r2d2``; None if no package has it.
+    """Return the file of a Python package of data (``pybullet_data``) that is called `name` there, as
+    ``kuka_iiwa/model.urdf``, ``kuka_iiwa/model.sdf`` or ``mjcf/ant.xml``; None if no package has it. A URDF
+    file may be named without its suffix, as ``r2d2``.
 
     A path never leaves the package; one that begins with a dot is a file of the user's own.
     """
     if not name or os.path.isabs(name) or {".", ".."}.intersection(name.split("/")):
         return None
-    file = name if name.endswith(".urdf") else f"{name}.urdf"
+    file = name if name.endswith(_DESCRIPTIONS) else f"{name}.urdf"
     for folder in data_folders():
         with suppress(OSError, ValueError):
             found = (folder / file).resolve()
@@ -69,14 +73,17 @@ _OF_MAKER = {
 
 
 def _hint_of_data_package(name: str) -> str:
-    """Return a clause with the URDF files of packages of data whose file or folder is called `name`, else
-    with the nearest names; empty without one."""
-    word = name.removesuffix(".urdf")
+    """Return a clause with the files of packages of data that have the suffix of `name`, else .urdf, and
+    whose file or folder is called so, else with the nearest names; empty without one."""
+    suffix = PurePath(name).suffix
+    if suffix not in _DESCRIPTIONS:
+        suffix = ".urdf"
+    word = name.removesuffix(suffix)
     files = [
         path.relative_to(folder).as_posix()
         for folder in data_folders()
         for depth in ("*", "*/*", "*/*/*")
-        for path in sorted(folder.glob(f"{depth}.urdf"))
+        for path in sorted(folder.glob(f"{depth}{suffix}"))
     ]
     same = [each for each in files if word in (Path(each).stem, Path(each).parent.name)]
     if same:

@@ -10,6 +10,7 @@ from functools import cached_property
 from dynx.argument_types import checks_types
 from dynx.errors import DynxError
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints_of_urdf
 from dynx.model.document_format import Format, format_of_root
 from dynx.model.elements import Inertial, Vector
 from dynx.model.loading import read_model
@@ -38,11 +39,16 @@ class Case:
 
     @cached_property
     def reading(self) -> Model | DynxError:
-        """The result of `dynx.load` on the document: a model, or the error."""
+        """The result of `dynx.load` on the document: a model, or the error; an error for URDF with a ball
+        joint."""
         text = self.source.text_with_lines_before
         try:
             gravity = self.gravity if self.form == "urdf" else None
-            return read_model(text, self.source.source, base=self.base, gravity=gravity)
+            model = read_model(text, self.source.source, base=self.base, gravity=gravity)
+            if self.form == "urdf":
+                # Engines that refuse the joint are compared on the chain that the rule DX210 makes of it.
+                refuse_ball_joints_of_urdf(model)
+            return model
         except DynxError as error:
             return error
 

@@ -51,6 +51,9 @@ _BLANKS = " \t\r\n"
 """The white space of XML, which every engine skips in front of a number and not every one behind it."""
 
 _ARITHMETIC = re.compile(r"\$\{([0-9.eEpi+*/() -]{1,200})\}")
+OPTIONAL_ENVIRONMENT = re.compile(r"\$\(optenv[ \t]+[A-Za-z_][A-Za-z_0-9]*[ \t]+([^()${}]{1,200})\)")
+"""Environment variable in xacro, with the value that it has if it is not set."""
+
 _SIGNS: dict[type, Callable[[float], float]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
 _OPERATIONS: dict[type, Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -152,8 +155,10 @@ def is_unexpanded(text: str) -> bool:
 
 
 def _expression(text: str, count: int) -> Misspelling:
-    """Return the fault of a text with expressions; `meant` has their values where all are mere arithmetic."""
+    """Return the fault of a text with expressions; `meant` has their values where all are mere arithmetic, or
+    environment variables with a default."""
     plain = _ARITHMETIC.sub(lambda found: _value(found.group(1)), text)
+    plain = OPTIONAL_ENVIRONMENT.sub(lambda found: found.group(1), plain)
     words = plain.split()
     return Misspelling(
         "expression", " ".join(words) if len(words) == count and all(map(is_number, words)) else ""

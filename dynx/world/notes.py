@@ -416,8 +416,11 @@ def _wrenches(layout: Layout, loads: LastLoads, h: float) -> Iterator[str]:
 
 def _overlaps_as_cause(engine: Stepper) -> Iterator[str]:
     for overlap in islice(overlaps_of(engine), 1):
+        names = f"{shown(overlap.a)} and {shown(overlap.b)}"
+        pair = f"({shown(overlap.a)}, {shown(overlap.b)})"
         yield (
-            f"{shown(overlap.a)} and {shown(overlap.b)} overlap by {1e3 * overlap.depth:.3g} mm at the start"
+            f"{names} overlap by {1e3 * overlap.depth:.3g} mm at the start: "
+            f"move one of them, or let them pass through each other by ignored=[{pair}] of the Scene"
         )
 
 

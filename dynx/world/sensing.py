@@ -165,7 +165,7 @@ class LastReadings(dict[str, SensorReading]):
                 later = f" and its delay of {sensor.delay:g} s" if sensor.delay else ""
                 raise ArgumentError(
                     f"{sensor} has no reading at {self.time:g} s; a sample can be read after the step of the "
-                    f"engine in which it is taken{later}"
+                    f"engine in which it is taken{later}; get({shown(name)}) is None until then"
                 )
         names = [*self, *(sensor.name for sensor in self.waiting)]
         raise UnknownNameError(f"the world has no sensor {shown(name)}{nearest(name, names)}")

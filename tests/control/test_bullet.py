@@ -21,7 +21,7 @@ from dynx.control import (
 )
 from dynx.control.bullet import BulletMotorCommand
 from dynx.engines.pybullet.stepper import BulletStepper
-from dynx.errors import ArgumentError, ControlError, GainError, UnsupportedFeatureError
+from dynx.errors import ArgumentError, ControlError, GainError, UnknownNameError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.elements import JointDynamics
 from dynx.model.loading import load
@@ -68,10 +68,9 @@ def test_a_motor_tells_the_engine_the_most_that_it_gives() -> None:
     robot, motion = tutorial_robot(), tutorial_motion()
     measurement, setpoint = Measurement(0.0, motion.start.q, motion.start.v), motion.start
     for kind in (BulletPositionMotor, BulletVelocityMotor):
-        assert kind(robot).command(measurement, setpoint).forces is None
+        assert "forces" not in kind(robot).command(measurement, setpoint).lists()
         limits = [10.0, 20.0, 30.0, 4.0, 5.0, np.inf]
-        forces = kind(robot, force=limits).command(measurement, setpoint).forces
-        assert forces is not None
+        forces = kind(robot, force=limits).command(measurement, setpoint).lists()["forces"]
         assert forces[:5] == limits[:5]
         assert np.isfinite(forces[5])
 
@@ -179,6 +178,51 @@ def test_what_motors_cannot_be() -> None:
     assert np.abs(moved.error[:, 6:]).max() < 1e-3
     with pytest.raises(ArgumentError, match="one of POSITION_CONTROL"):
         BulletMotorCommand("MAGIC")
+
+
+@pytest.mark.parametrize(
+    ("given", "known"),
+    [
+        ("maxVelocity", "max_velocities"),
+        ("max_forces", "forces"),
+        ("targetPositions", "positions"),
+        ("velocityGain", "velocity_gains"),
+        ("foo", "known: mode, positions"),
+    ],
+)
+def test_a_mistaken_argument_of_a_command_is_answered(given: str, known: str) -> None:
+    with pytest.raises(UnknownNameError, match=rf"no option '{given}'.*{known}"):
+        BulletMotorCommand("POSITION_CONTROL", **{given: 1.0})
+
+
+def test_a_motor_with_a_largest_velocity_reaches_it_in_one_step_and_keeps_it() -> None:
+    """PyBullet clamps the velocity at which a step ends; other modes, and the next command, know no clamp."""
+    robot = tutorial_robot()
+    scene = Scene(robots=(SceneRobot("arm", robot),))
+    slow = BulletMotorCommand("POSITION_CONTROL", positions=1.0, position_gains=1.0, max_velocities=0.5)
+    with World(scene, "pybullet", collisions=False) as world:
+        world.step(motors={"arm": slow})
+        np.testing.assert_allclose(world.state.robots["arm"].v, 0.5, atol=1e-2)
+        world.step(motors={"arm": BulletMotorCommand("VELOCITY_CONTROL", velocities=[2.0] * 6)})
+        np.testing.assert_allclose(world.state.robots["arm"].v, 2.0, atol=1e-2)
+    with pytest.raises(ArgumentError, match="for POSITION_CONTROL alone"):
+        BulletMotorCommand("VELOCITY_CONTROL", velocities=1.0, max_velocities=0.5)
+    with pytest.raises(ArgumentError, match="above 0"):
+        BulletMotorCommand("POSITION_CONTROL", max_velocities=0.0).checked(robot)
+
+
+def test_defaults_of_a_command_are_those_that_the_reference_states() -> None:
+    robot = tutorial_robot()
+    given = BulletMotorCommand(
+        "POSITION_CONTROL", positions=0.0, velocities=0.0, forces=1e5, position_gains=0.1, velocity_gains=1.0
+    )
+    found: list[Floats] = []
+    for command in (given, BulletMotorCommand("POSITION_CONTROL")):
+        scene = Scene(robots=(SceneRobot("arm", robot, q=(0.3,) * 6),))
+        with World(scene, "pybullet", collisions=False) as world:
+            world.step(motors={"arm": command})
+            found.append(world.state.robots["arm"].v)
+    assert np.array_equal(found[0], found[1])
 
 
 @pytest.mark.parametrize("name", ["PositionMotor", "VelocityMotor", "PDMotor", "TorqueMotor", "EngineMotor"])

@@ -132,10 +132,17 @@ def test_words_of_a_vector_are_zero(written: str, meant: str) -> None:
     assert (found.fault, found.meant) == ("word", meant)
 
 
-@pytest.mark.parametrize("written", ["${mass}", "2.5${unit}", "$(optenv XYZ 1 2 3)", "${a} 0 0"])
+@pytest.mark.parametrize("written", ["${mass}", "2.5${unit}", "$(env XYZ)", "$(optenv XYZ)", "${a} 0 0"])
 def test_what_xacro_did_not_expand_is_not_understood(written: str) -> None:
     assert misspelled_number(written) == Misspelling("expression", "")
     assert misspelled_vector(written) == Misspelling("expression", "")
+
+
+def test_an_environment_variable_means_its_default() -> None:
+    assert misspelled_vector("$(optenv XYZ 1 2 3)") == Misspelling("expression", "1 2 3")
+    assert misspelled_number("$(optenv MASS 2.5)") == Misspelling("expression", "2.5")
+    assert misspelled_number("$(optenv XYZ 1 2 3)") == Misspelling("expression", "")
+    assert misspelled_vector("$(optenv XYZ $(arg x) 2 3)") == Misspelling("expression", "")
 
 
 @pytest.mark.parametrize(

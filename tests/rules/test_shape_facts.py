@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from dynx.doctor import diagnose
 from dynx.engines.silence import silence
 from dynx.errors import EngineError
 from dynx.loaded import installed_engines, load_as
+from dynx.model.loading import load
 from dynx.rules import find_rule
 from tests.rules.documents import case_of, joint, link
 from tests.rules.trap_cases import mended
@@ -120,6 +122,36 @@ def test_mujoco_alone_refuses_an_expression_in_a_collision(
         assert ("<collision>" in remedy.case.source.text) == bool(origin)
         assert "${" not in remedy.case.source.text
         assert not any(refused(remedy.case.source.text, engine, tmp_path) for engine in INSTALLED)
+
+
+@pytest.mark.parametrize(
+    ("inertial", "origin"),
+    [
+        ("", 'xyz="$(optenv IMU_XYZ 0.19 0 0.149)" rpy="0 ${pi/2} 0"'),
+        ("$(optenv MASS 2.5)", 'xyz="0 0 1"'),
+    ],
+)
+def test_a_number_of_an_expression_that_states_it_is_written(inertial: str, origin: str) -> None:
+    ends = f'<origin {origin}/><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>'
+    text = case_of(
+        link("base"), link("arm"), f'<joint name="elbow" type="continuous">{ends}</joint>'
+    ).source.text
+    if inertial:
+        text = re.sub(r'(<mass value=")[^"]*', rf"\g<1>{inertial}", text)
+    report = diagnose(text, samples=1, counterexamples=False)
+    assert report.explained
+    assert {each.rule for each in report.differences} == {"DX429"}
+    assert report.mended is not None
+    model = load(report.mended)
+    origin_read = model.joint("elbow").origin
+    assert (origin_read.xyz == (0.19, 0.0, 0.149)) == (not inertial)
+    assert (model.inertial("arm").mass == 2.5) == bool(inertial)
+
+
+def test_an_expression_without_a_stated_value_is_left() -> None:
+    ends = '<origin xyz="$(arg x) 0 0"/><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>'
+    case = case_of(link("base"), link("arm"), f'<joint name="elbow" type="continuous">{ends}</joint>')
+    assert not find_rule("DX429").detect(case)
 
 
 @pytest.mark.parametrize(

@@ -219,13 +219,21 @@ class BulletRobot:
         self.release_motors()
         if command is not None and self.object.links:
             engine = self._client.engine
-            self._client.call(
-                engine.setJointMotorControlArray,
-                self.object.body,
-                self.object.links,
-                getattr(engine, command.mode),
-                **command.options(),
-            )
+            mode = getattr(engine, command.mode)
+            if command.max_velocities is None:
+                self._client.call(
+                    engine.setJointMotorControlArray,
+                    self.object.body,
+                    self.object.links,
+                    mode,
+                    **command.options(),
+                )
+                return
+            # The call for all joints at once has no largest velocity.
+            for k, link in enumerate(self.object.links):
+                self._client.call(
+                    engine.setJointMotorControl2, self.object.body, link, mode, **command.options(k)
+                )
 
     def motor_torque(self, command: BulletMotorCommand) -> Floats:
         """Return the torque (nv,) of Bullet's motors in the last step; NaN for PD_CONTROL, which Bullet's

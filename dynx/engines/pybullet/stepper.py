@@ -271,7 +271,7 @@ class BulletStepper(Stepper):
                 # Bullet forgets a torque after each step, unlike the targets of the other modes.
                 self.robots[k].command(None)
                 base = [0.0] * (6 if self.layout.robots[k].model.floating else 0)
-                torque = base + (command.forces or [0.0] * len(self.robots[k].object.links))
+                torque = base + command.lists().get("forces", [0.0] * len(self.robots[k].object.links))
                 self._motor_torques.append(partial(self._apply[k], torque))
             else:
                 self.robots[k].command(command)

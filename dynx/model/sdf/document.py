@@ -43,6 +43,11 @@ ONE_ROBOT = (
     "a Model is one robot: give each a file of its own, which a scene of dynx.world.read_scene can name"
 )
 
+_OF_WORLD = (
+    ": PyBullet alone reads such a link, as the base; give it another name, here and in the joints that "
+    "name it, or, if it stands still and has no shape, remove it; its joints then connect to the world"
+)
+
 _VERSION = re.compile(r"\s*([0-9]{1,3})\.([0-9]{1,3})(?:\.[0-9]+)?\s*")
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
 _FILES = (".sdf", ".world", ".xml", ".urdf")
@@ -340,7 +345,8 @@ class _ScopeReader:
                 element, f"the file has more than {MAX_PARTS} links, joints, frames and shapes"
             )
         if is_reserved(name) and (kind == "link" or scope.version >= (1, 7)):
-            raise reading.error(element, f"{part.what} has a name that the format keeps for itself")
+            remedy = _OF_WORLD if kind == "link" and name == WORLD else ""
+            raise reading.error(element, f"{part.what} has a name that the format keeps for itself{remedy}")
         other = scope.parts.get(name) or scope.models.get(name)
         if isinstance(other, NamedPart) and (other.kind == kind or scope.version >= (1, 7)):
             raise reading.error(

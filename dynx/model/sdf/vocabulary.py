@@ -16,6 +16,7 @@ _CONTACT = "friction and contacts are those of the scene"
 _FRAME = "no pose may refer to a frame inside of a link or joint"
 _SENSOR = "no sensor is read"
 _STATE = "the state of the file is not used"
+_VISUAL = "it belongs into a <visual>; the shape collides as without it"
 
 USED: dict[str, str] = {
     "sdf": "model world",
@@ -95,6 +96,7 @@ NOT_USED: dict[str, dict[str, str]] = {
     },
     "collision": {
         "auto_inertia_params": "they set up the calculation of another program",
+        **dict.fromkeys(("cast_shadows", "material", "meta", "transparency", "visibility_flags"), _VISUAL),
         "frame": _FRAME,
         "laser_retro": _NONE,
         "max_contacts": _CONTACT,

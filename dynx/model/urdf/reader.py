@@ -209,12 +209,14 @@ _TYPES: dict[str, JointType] = {
     "continuous": "continuous",
     "prismatic": "prismatic",
     "fixed": "fixed",
+    "spherical": "ball",
 }
+"""Types of URDF, and ``spherical``, an extension that PyBullet and MuJoCo read."""
+
 _REFUSED = {
     "planar": "two prismatic joints and a continuous one, with massless links between them",
     "floating": "base='floating' where the root moves freely, or three prismatic and three revolute joints",
-    "spherical": "three revolute joints, with massless links between them",
-    "ball": "three revolute joints, with massless links between them",
+    "ball": 'type="spherical", or three revolute joints, with massless links between them',
 }
 _READ = frozenset(["origin", "parent", "child", "axis", "limit", "dynamics", "mimic"])
 _KNOWN_IN_JOINT = _READ | {"calibration", "safety_controller", "gazebo", LOCKED_TAG, FRAME_TAG, SPRING_TAG}
@@ -240,7 +242,7 @@ def read_joint(element: Element, reading: Reading, floating_is_base: bool = Fals
         parent,
         child,
         origin,
-        axis=_read_axis(element, what, reading),
+        axis=(1.0, 0.0, 0.0) if kind == "ball" else _read_axis(element, what, reading),
         limits=_read_limits(element, kind, what, reading),
         dynamics=_read_dynamics(element, what, reading),
         mimic=None if locked else _read_mimic(element, what, reading),
@@ -265,6 +267,10 @@ def _read_type(element: Element, what: str, reading: Reading, floating_is_base: 
     if kind in _REFUSED:
         raise reading.unsupported(element, f"{what} is {kind}, which is not supported; use {_REFUSED[kind]}")
     raise reading.error(element, f"{what} has the unknown type {shown(kind)}{nearest(kind, _TYPES)}")
+
+
+_SWINGS = ("lower", "upper", "twist")
+"""Attributes of the ``<limit>`` of a spherical joint that are angles in PyBullet: swings and twist."""
 
 
 def _read_axis(element: Element, what: str, reading: Reading) -> Vector:
@@ -306,6 +312,15 @@ def _read_limits(element: Element, kind: JointType, what: str, reading: Reading)
             reading.note(limit, f"{what} has no {attribute} limit; it is read as unlimited")
         elif most[attribute] < 0.0:
             reading.note(limit, f"the {attribute} limit of {what} is negative")
+    if kind == "ball":
+        swings = [name for name in _SWINGS if name in limit.attributes]
+        if swings:
+            reading.note(
+                limit,
+                f"{what} is spherical; its limits ({', '.join(swings)}) were ignored: PyBullet alone has "
+                "them, as angles of swing and twist",
+            )
+        return Limits(**most)
     if kind == "continuous":
         if "lower" in limit.attributes or "upper" in limit.attributes:
             reading.note(limit, f"{what} is continuous; its lower and upper limits were ignored")

@@ -154,7 +154,10 @@ class Reading:
     ) -> DescriptionError:
         hint = ""
         if "${" in text or "$(" in text:
-            hint = "; this is xacro that was not expanded: name the file .xacro, which dynx expands"
+            hint = (
+                "; this is xacro that was not expanded: copy the file, in its folder, to a name that ends in "
+                ".xacro, which dynx expands; in URDF, dynx doctor --fix writes values that the file states"
+            )
         elif "," in text:
             hint = "; decimals take a point, and numbers are separated by white space"
         message = f"{attribute} in <{element.tag}> of {what} is {shown(text)}; wanted {wanted}{hint}"

@@ -8,12 +8,14 @@ from dynx.errors import shown
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.numbers_in_text import (
+    OPTIONAL_ENVIRONMENT,
     MisspelledNumberRule,
     Misspelling,
     NumericAttribute,
     joint_attributes,
     misspelled_number,
     misspelled_vector,
+    numeric_attributes,
     shape_attributes,
 )
 
@@ -372,31 +374,44 @@ Expression = tuple[NumericAttribute, Misspelling]
 
 
 class ExpressionNotExpanded(EditingRule):
-    """DX429 expression-not-expanded: A number that dynx does not need is an expression of xacro.
+    """DX429 expression-not-expanded: A number is an expression of xacro.
 
-    Examples are ``<origin rpy="${3.14159/2} 0 0"/>`` in a ``<collision>``, and
-    ``<safety_controller k_velocity="${k}"/>``. Such a file was never expanded by ``xacro``, or it was
-    expanded by hand.
+    Examples are ``<origin rpy="${3.14159/2} 0 0"/>`` in a ``<collision>``,
+    ``<safety_controller k_velocity="${k}"/>``, and ``<origin xyz="$(optenv IMU_XYZ 0.19 0 0.149)"/>`` in a
+    ``<joint>``. Such a file was never expanded by ``xacro``, or it was expanded by hand.
 
     - In a ``<collision>``, MuJoCo 4.0 refuses the expression ("bad format in attribute 'rpy'").
     - Pinocchio 4.1 refuses the expression in ``<calibration>``, in ``<safety_controller>``, in the position
       limits of a continuous joint, and in the ``<limit>``, ``<dynamics>`` and ``<mimic>`` of a fixed joint.
       Drake 1.51 refuses it in these limits and in this ``<mimic>``.
-    - PyBullet 3.2.7 reads 0, without a warning: the shape is at another place, or has no size.
+    - In the ``<origin>`` of a joint, Pinocchio, MuJoCo and Drake refuse the expression. In an ``<inertial>``,
+      MuJoCo and Drake refuse it, and Pinocchio drops the whole inertial with a line on stderr.
+    - PyBullet 3.2.7 takes the first three words, and reads 0 for each word that is no number, without a
+      warning. From ``$(optenv IMU_XYZ 0.19 0 0.149)`` it reads the position (0, 0, 0.19), and from
+      ``$(optenv MASS 2.5)`` the mass 0.
 
     In a ``<visual>`` every engine accepts the expression. In an ``<inertial>``, and in the elements of a
     joint that this list does not name, dynx refuses the expression, because the dynamics depends on the
     number.
 
-    What to do: write the number, or name the file ``.xacro``, so that dynx expands it with ``xacro``.
-    ``dynx doctor --fix`` calculates simple expressions (numbers, ``pi``, ``+ - * /``). For any other
-    expression it removes the ``<collision>``, the element of the joint, or the position limit.
+    What to do: write the number, or copy the file, in its folder, to a name that ends in ``.xacro``, which
+    dynx expands with ``xacro``. ``dynx doctor --fix`` calculates simple expressions (numbers, ``pi``,
+    ``+ - * /``). For ``$(optenv NAME DEFAULT)`` it writes the default. For any other expression it removes
+    the ``<collision>``, the element of the joint that dynx does not read, or the position limit.
     """
 
     stage = "reading"
     advice = "Write the number, or expand the file with xacro."
-    engines = measured_on("pinocchio", "mujoco", "drake")
+    engines = EVERY_ENGINE
     changed = "wrote the values of expressions of xacro, or removed what they belong to"
+
+    def decision(self, case: Case) -> str | None:
+        """Name the first environment variable whose default is written; None without one."""
+        for each, _ in _expressions(case, numeric_attributes(case.source)):
+            found = OPTIONAL_ENVIRONMENT.search(each.text_in(case.source))
+            if found is not None:
+                return f"{self.id}: the default of {shown(found.group())} was written"
+        return None
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Yield one correction for each collision and each element of a joint with such numbers."""
@@ -415,6 +430,22 @@ class ExpressionNotExpanded(EditingRule):
                     yield _expression_correction(case, found, *removals)
                 else:
                     yield _expression_correction(case, found, case.source.removal(element))
+        yield from _needed_values(case)
+
+
+def _needed_values(case: Case) -> Iterator[Correction]:
+    """Yield one correction for each element of inertials and joints with numbers that dynx needs, and whose
+    expressions all have a known value."""
+    by_element: dict[SourceElement, list[Expression]] = {}
+    for each in _expressions(case, numeric_attributes(case.source)):
+        around = each[0].element.parent
+        if around is None or around.tag not in ("inertial", "joint"):
+            continue
+        if around.tag == "inertial" or not _is_unread(each[0], around.attributes.get("type")):
+            by_element.setdefault(each[0].element, []).append(each)
+    for found in by_element.values():
+        if all(misspelling.meant for _, misspelling in found):
+            yield _expression_correction(case, found)
 
 
 def _expressions(case: Case, attributes: Iterable[NumericAttribute]) -> Iterator[Expression]:

@@ -30,7 +30,11 @@ class JointOfSeveralFreedoms(EditingRule):
     - ``floating`` in the middle of a tree: Pinocchio uses a quaternion. PyBullet makes the joint fixed, and
       prints one line on stdout. MuJoCo and Drake refuse the file, or leave the link free in the world.
 
-    dynx refuses such a joint in URDF.
+    dynx reads ``spherical`` as a ball joint, the motion of which is that of PyBullet's joint. As in PyBullet,
+    ``<axis>`` has no effect and damping acts about each of the three axes. The limits ``lower``, ``upper``
+    and ``twist`` of such a joint are angles of swing and twist in PyBullet. dynx writes a note and does not
+    apply them. dynx refuses the other types in URDF. The doctor compares the engines on the file with the
+    remedy.
 
     What to do: write joints of one degree of freedom each, with massless links between them.
     ``dynx doctor --fix`` replaces the joint by such a chain. A spherical joint becomes three rotations, a

@@ -522,7 +522,7 @@ FAULTS = {
         DescriptionError,
         "frame 'link' has the name of a link",
     ),
-    "reserved": ('<link name="base"/>', '<link name="world"/>', DescriptionError, "keeps for itself"),
+    "reserved": ('<link name="base"/>', '<link name="world"/>', DescriptionError, "give it another name"),
     "mass": (
         '"base"/>',
         '"base"><inertial><mass>-1</mass></inertial></link>',
@@ -659,6 +659,17 @@ def test_every_element_that_is_not_used_is_named_once() -> None:
     notes = [note.message for note in dynx.load(vendor).notes]
     assert any("<drake:thing> of <link> is not read" in each for each in notes)
     assert any("<plugin> of <link> is not read" in each for each in notes)
+
+
+def test_a_colour_in_a_collision_is_named_and_changes_nothing() -> None:
+    shape = "<geometry><sphere><radius>1</radius></sphere></geometry>"
+    link = f'<link name="a"><collision name="c">{shape}</collision></link>'
+    bare = f'<sdf version="1.6"><model name="m">{link}</model></sdf>'
+    model = dynx.load(bare.replace(shape, f"{shape}<material><diffuse>1 0 0 1</diffuse></material>"))
+    assert any(
+        "<material> of <collision> is not read: it belongs into a <visual>" in str(n) for n in model.notes
+    )
+    assert model.geometry == dynx.load(bare).geometry
 
 
 @given(text=models())

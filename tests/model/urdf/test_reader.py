@@ -475,11 +475,25 @@ def test_a_bad_description_is_refused_with_line_and_reason(case: str) -> None:
     assert str(caught.value).isprintable()
 
 
-@pytest.mark.parametrize("kind", ["planar", "spherical", "ball", "floating"])
+@pytest.mark.parametrize("kind", ["planar", "ball", "floating"])
 def test_joints_of_several_degrees_of_freedom_raise(kind: str) -> None:
     with pytest.raises(UnsupportedFeatureError, match=f"joint 'j' is {kind}.*use") as caught:
         load(joint(kind=kind).replace('<link name="a"/>', f'<link name="a">{INERTIAL}</link>'))
     assert caught.value.line is not None
+
+
+def test_a_spherical_joint_is_a_ball_joint_whose_axis_and_swings_are_not_read() -> None:
+    inside = '<axis xyz="0 0 0"/><limit effort="5" velocity="2" lower="0.2" upper=".8" twist=".3"/>'
+    model = load(joint('<dynamics damping="0.5"/>', "spherical", inside))
+    (found,) = model.ball_joints
+    assert (found.type, found.limits, found.dynamics.damping) == (
+        "ball",
+        Limits(0.0, math.inf, 2.0, 5.0),
+        0.5,
+    )
+    assert [note.message for note in model.notes if "limits (lower, upper, twist)" in note.message]
+    bare = load(joint("", "spherical", '<limit effort="5" velocity="2"/>'))
+    assert not any("limits" in note.message for note in bare.notes)
 
 
 @pytest.mark.parametrize(

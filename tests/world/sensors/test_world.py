@@ -172,8 +172,9 @@ def test_a_sensor_without_a_reading_is_named_with_the_reason() -> None:
             world.read_sensors()["imu"]
         assert str(early.value) == (
             "the imu sensor 'imu' has no reading at 0 s; a sample can be read after the step of the engine "
-            "in which it is taken"
+            "in which it is taken; get('imu') is None until then"
         )
+        assert world.read_sensors().get("imu") is None
         world.step()
         readings = world.read_sensors()
         assert readings["imu"].t == 0.0
