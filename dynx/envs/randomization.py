@@ -356,20 +356,22 @@ class Pushes:
         """Return the accelerations (n, 2) [m/s^2] along x and y of the world, of environments `rows` (n,) in
         `steps` (n,) of their `episodes`."""
         intervals, step = np.divmod(steps, self._interval)
-        blocks = np.column_stack([episodes, intervals // BLOCK_STEPS])
-        for k in np.flatnonzero((self._blocks[rows] != blocks).any(axis=1)).tolist():
-            self._draw(streams, int(rows[k]), *blocks[k].tolist())
-        self._blocks[rows] = blocks
-        place = intervals % BLOCK_STEPS
+        blocks, place = np.divmod(intervals, BLOCK_STEPS)
+        drawn = self._blocks[rows]
+        for k in np.flatnonzero((drawn[:, 0] != episodes) | (drawn[:, 1] != blocks)).tolist():
+            self._draw(streams, int(rows[k]), int(episodes[k]), int(blocks[k]))
         begin = self._begin[rows, place]
-        acts = (begin <= step) & (step < begin + self._duration)
-        return np.where(acts[:, None], self._drawn[rows, place], 0.0)
+        pushed = np.flatnonzero((begin <= step) & (step < begin + self._duration))
+        found = np.zeros((len(rows), 2))
+        found[pushed] = self._drawn[rows[pushed], place[pushed]]
+        return found
 
     def _draw(self, streams: Streams, row: int, episode: int, block: int) -> None:
         random, speed = np.empty((BLOCK_STEPS, 2)), np.empty(BLOCK_STEPS)
         streams.uniform(Purpose.PUSH, episode, block, random, row)
         draw = streams.normal if self._speed.kind == NORMAL else streams.uniform
         draw(Purpose.PUSH_SPEED, episode, block, speed, row)
+        self._blocks[row] = episode, block
         self._begin[row] = np.floor(random[:, 0] * (self._interval - self._duration + 1))
         angle = 2.0 * np.pi * random[:, 1]
         acceleration = self._speed.numbers(speed) / (self._duration * self._control_dt)
