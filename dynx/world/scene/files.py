@@ -62,7 +62,8 @@ def read_scene(
     expressions of that file as Python code: read only scenes with such files that you trust. Other files may
     come from anyone.
 
-    A file in MJCF (``.xml``, ``.mjcf``) starts at its `qpos0`, or at the `keyframe` of that name. The page
+    A file in MJCF (``.xml``, ``.mjcf``) starts at its `qpos0`, or at the `keyframe` of that name. If it does
+    not exist, dynx searches the package ``pybullet_data``, as for ``mjcf/striker.xml``. The page
     "Robots in MJCF" lists how dynx reads its elements, and `notes` of the scene name elements that dynx does
     not read.
 
@@ -73,6 +74,11 @@ def read_scene(
     path = Path(checked_path(source))
     suffix = path.suffix.lower()
     if suffix in MJCF_SUFFIXES:
+        if isinstance(source, str) and not path.exists():
+            # Imported here, because most files are there.
+            from dynx.model.missing_robot import in_data_package
+
+            path = in_data_package(source) or path
         return _read_mjcf(path, package_dirs, keyframe)
     if keyframe is not None:
         raise ArgumentError(

@@ -197,6 +197,20 @@ def test_a_fault_is_named_with_its_place(change: dict[str, Any], kind: type[Dynx
         scene_from_document({"schema": "dynx.scene/1", **change})
 
 
+def test_a_scene_of_pybullet_data_is_found_by_its_path_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = importlib.util.find_spec("pybullet_data")
+    if data is None or data.origin is None:
+        pytest.skip("needs pybullet_data")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(RobotNotFoundError, match="no such file"):
+        read_scene("mjcf/no_such_scene.xml")
+    found = read_scene("mjcf/striker.xml")
+    assert found.name == read_scene(Path(data.origin).parent / "mjcf/striker.xml").name
+    assert len(found.robots) + len(found.bodies) >= 3
+
+
 def test_files_that_are_no_scene_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RobotNotFoundError, match="did you mean 'stack'"):
         read_scene("stak")
