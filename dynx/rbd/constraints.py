@@ -18,6 +18,12 @@ speculative contact, whose gap phi may close in the step of length h, has c + ph
 energy: parts that overlap may not close further, and the displacement of the step is that of the velocities
 plus that of further impulses, without friction, which end a part of each overlap (`displacement_velocity`).
 
+**Contradictions.** A weld may pull a body into the part that it touches. Near such places the displacement
+that meets all rows is long: the whole robot turns for millimetres of one error. Beyond them there is none.
+Where it would be faster than `MAX_DISPLACEMENT_SPEED`, or does not exist, errors are *compliant*: a row of a
+compliance s has w + s g x = 0 in place of w = 0. Then the displacement minimises its kinetic energy plus that
+of what remains of the errors, and where errors and contacts balance it is zero.
+
 **Sweeps** (projected Gauss-Seidel) visit one set after the other: x becomes the point of the set closest to
 x - w / g, with the largest eigenvalue g of the set's block of G. A fixed point is a solution. One sweep is
 text for any scalar; kernels have sweeps of their own (`dynx.rbd.block_sweeps`), with the same law.
@@ -51,6 +57,18 @@ CORRECTION = 0.2
 
 MAX_CORRECTION_SPEED = 1.0
 """Largest speed [m/s or rad/s] at which a step takes back an overlap or an error of a constraint."""
+
+MAX_DISPLACEMENT_SPEED = 2.0
+"""Largest root of the mean square speed [m/s] of what a coordinate moves in a displacement that takes back
+errors. It is above that of a body whose errors along three axes have `MAX_CORRECTION_SPEED`."""
+
+COMPLIANCES = (1e-2, 1e-1, 1.0, 10.0, 100.0)
+"""Compliances of errors that contradict others, of which the first that makes no displacement too fast is
+taken."""
+
+VIOLATED_COMPLIANCE = 1e-3
+"""Compliance of the velocities of a constraint whose error takes several steps to take back. It is a damper,
+so that impulses have a bound where a contact contradicts the constraint, and take energy."""
 
 NEGLIGIBLE = 1e-10
 """Overlap and error of a constraint [m or rad] that count as none."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import dynx
 from dynx.compiled.contact_step import contact_step_text, shapes_on_plane
 from dynx.compiled.step import compiled
-from dynx.engines.own.stepper import MAX_RESIDUAL
+from dynx.engines.own.impulses import MAX_RESIDUAL
 from dynx.model import Model
 from dynx.model.elements import Joint, JointDynamics, Limits, Link
 from dynx.model.geometry import Box, Capsule, Collision, Geometry, Shape, Sphere

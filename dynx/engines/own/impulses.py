@@ -36,9 +36,12 @@ from dynx.engines.own.parts import OwnRobot
 from dynx.engines.own.touching import MARGIN, REACH, PossibleContact
 from dynx.rbd.constraints import (
     ATTEMPTS,
+    COMPLIANCES,
     MAX_CORRECTION_SPEED,
+    MAX_DISPLACEMENT_SPEED,
     NEGLIGIBLE,
     TOLERANCE,
+    VIOLATED_COMPLIANCE,
     ConstraintSets,
     Disk,
     Solution,
@@ -56,6 +59,12 @@ NEGLIGIBLE_CLOSING = 1e-10
 
 NEGLIGIBLE_REBOUND = 1e-9
 """Speed after an impact [m/s] that counts as none."""
+
+MAX_RESIDUAL = 1e-6
+"""Residual of the impulses [m/s or rad/s] above which a step counts as not solved."""
+
+UNMET = 0.1
+"""Share of the wanted change of an error from which what remains of it is noted."""
 
 STUCK = 1e-9
 """Velocity [rad/s or m/s] of a joint that sticks by dry friction, which is rounding."""
@@ -138,8 +147,9 @@ class Island:
         self._nv = first
         self.residual = 0.0
         """Largest residual of the impulses [m/s or rad/s]."""
-        self.displacement_residual = 0.0
-        """Largest residual of the displacement that takes back overlaps, over the step [m/s or rad/s]."""
+        self.contradiction: tuple[Key, ...] = ()
+        """Contacts, joint limits and constraints whose overlaps and errors contradict each other, one or two
+        of them; empty if the step takes them back."""
 
     # -- rows ---------------------------------------------------------------------------------
 
@@ -192,16 +202,21 @@ class Island:
             for (number, joint, side), gap in zip(rows, gaps.tolist(), strict=True)
         )
 
-    def _constraint_rows(self) -> tuple[Floats, Floats, Floats]:
-        """Return J (m, nv), biases (m,) [m/s or rad/s] and errors (m,) [m or rad] of welds and points: 6 and
-        3 rows in axes of the world.
+    def _constraint_rows(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return J (m, nv), biases (m,) [m/s or rad/s], errors (m,) [m or rad] and compliances (m,) of welds
+        and points: 6 and 3 rows in axes of the world.
 
         The bias is the change of J in half a step times the velocity. A step whose velocity v obeys J v plus
         bias = 0 ends where the constraint holds, to the third order in its length. Its impulses are those of
         SHAKE (Ryckaert, Ciccotti and Berendsen, 1977), which is symplectic. With J v = 0 they would take
         energy from every motion along a curve.
+
+        A constraint whose error one step does not take back has no bias, since it does not hold at the end of
+        the step either, and is compliant. A contact that contradicts it makes its impulses large, and with
+        them a bias would do work.
         """
         blocks, biases, errors = [np.zeros((0, self._nv))], [NO_ROWS], [NO_ROWS]
+        compliances = [NO_ROWS]
         v = self._velocity("v")
         for constraint in self._constraints.values():
             size = 3 if constraint.kind == "point" else 6
@@ -218,10 +233,14 @@ class Island:
                     part.midpoint_jacobian(owner.body), part.midpoint_pose(owner.body), anchor.T
                 )
             turned = quat_log(quat_from_rotation(ends[0][:3, :3] @ ends[1][:3, :3].T))
+            error = np.concatenate([ends[0][:3, 3] - ends[1][:3, 3], turned])[:size]
+            violated = bool((np.abs(error) > MAX_CORRECTION_SPEED * self._h).any())
             blocks.append(first[:size])
-            biases.append((middle - first)[:size] @ v)
-            errors.append(np.concatenate([ends[0][:3, 3] - ends[1][:3, 3], turned])[:size])
-        return np.concatenate(blocks), np.concatenate(biases), np.concatenate(errors)
+            biases.append(np.zeros(size) if violated else (middle - first)[:size] @ v)
+            errors.append(error)
+            compliances.append(np.full(size, VIOLATED_COMPLIANCE if violated else 0.0))
+        rows = np.concatenate(blocks), np.concatenate(biases)
+        return *rows, np.concatenate(errors), np.concatenate(compliances)
 
     def _velocity(self, of: str) -> Floats:
         """Return the velocities of all parts (nv,): `free` or `v`."""
@@ -272,7 +291,7 @@ class Island:
         present = np.array([_present(pair.friction) for pair in self._pairs], dtype=np.bool_).reshape(n, 6)
         limits, limit_gaps = self._limit_rows()
         dry = [(k, j) for k, part in self.parts.items() for j in part.dry_joints.tolist()]
-        bilateral, biases, errors = self._constraint_rows()
+        bilateral, biases, errors, compliances = self._constraint_rows()
         units = np.zeros((len(limits) + len(dry), self._nv))
         for row, (number, joint, side) in enumerate(limits):
             units[row, self._columns[number].start + joint] = side
@@ -286,6 +305,7 @@ class Island:
         )
         G = J @ X
         G = 0.5 * (G + G.T)
+        compliant = _with_compliance(G, sets.free, compliances)
         radii = [
             coefficient for pair in self._pairs for coefficient in pair.friction if coefficient > 0.0
         ] + [h * float(self.parts[number].dry[joint]) for number, joint in dry]
@@ -298,7 +318,7 @@ class Island:
         opening[list(sets.unilateral)] = [opening_velocity(gap, h) for gap in ways]
         opening[list(sets.free)] = biases
         c = J @ free
-        first = solve(sets, G, c + opening, numbers, start=start)
+        first = solve(sets, compliant, c + opening, numbers, start=start)
         u = free + X @ first.impulses
         if n < len(every):
             short = all_rows[:, 0] @ u < -np.maximum(all_gaps, 0.0) / h - NEGLIGIBLE_CLOSING
@@ -306,16 +326,15 @@ class Island:
             if short.any():
                 more = sorted([*borne, *np.flatnonzero(short).tolist()])
                 return self._step_on(more, every, all_rows, directions_of_all, all_gaps, warm)
-        last = self._impacts(sets, G, c, opening, numbers, first, normals, J)
+        last = self._impacts(sets, compliant, c, opening, numbers, first, normals, J)
         w = u if last is first else free + X @ last.impulses
         corrected = [part.correct_motors(w[self._columns[number]]) for number, part in self.parts.items()]
         if any(corrected):
             return self._step_on(borne, every, all_rows, directions_of_all, all_gaps, warm)
         self.residual = float(max(first.residuals.largest, last.residuals.largest))
-        correction = self._correction(sets, G, first.velocities - opening, gaps, limit_gaps, errors, normals)
-        displaced = u
-        if correction is not None:
-            displaced = u + X @ correction
+        velocities = first.velocities - opening
+        correction = self._correction(sets, G, X, velocities, gaps, limit_gaps, errors, normals, keys)
+        displaced = u if correction is None else u + correction
         for number, part in self.parts.items():
             columns = self._columns[number]
             part.finish_at(displaced[columns], self._at_rest(number, w[columns], dry, sets, last, numbers))
@@ -357,14 +376,16 @@ class Island:
         self,
         sets: ConstraintSets,
         G: Floats,
+        X: Floats,
         velocities: Floats,
         gaps: Floats,
         limit_gaps: Floats,
         errors: Floats,
         normals: NDArray[np.intp],
+        keys: Sequence[Key],
     ) -> Floats | None:
-        """Return the impulses (m,) of the displacement that takes back a part of overlaps and errors of
-        constraints, and keep its residual; None where there are none."""
+        """Return the velocity (nv,) of the displacement that takes back a part of overlaps and errors of
+        constraints, and keep what contradicts them; None where there are none."""
         h = self._h
         overlaps = bool((gaps < -NEGLIGIBLE).any())
         if not overlaps and not (np.abs(errors) > NEGLIGIBLE).any():
@@ -383,10 +404,64 @@ class Island:
         found = solve(
             smaller, G[np.ix_(part, part)], wanted[part], NO_ROWS, tolerance=tolerance, attempts=ATTEMPTS[:3]
         )
-        self.displacement_residual = float(found.residuals.largest)
-        impulses = np.zeros(sets.size)
-        impulses[part] = found.impulses
-        return impulses
+        displacement: Floats = X[:, part] @ found.impulses
+        if float(found.residuals.largest) <= MAX_RESIDUAL and not self._is_fast(displacement):
+            return displacement
+        # Overlaps may not grow by the displacement, but need not be taken back.
+        deep = np.flatnonzero(wanted[part[:count]] < 0.0)
+        hard = wanted[part[:count]]
+        hard[deep] = np.maximum(velocities[np.array(part, dtype=np.intp)[deep]], 0.0)
+        rows = [*part[:count], *np.array(part, dtype=np.intp)[deep].tolist(), *sets.free]
+        lower = np.concatenate([hard, wanted[rows[count:]]])
+        unilateral = count + len(deep)
+        larger = ConstraintSets(len(rows), tuple(range(unilateral)), free=tuple(range(unilateral, len(rows))))
+        for compliance in COMPLIANCES:
+            soft = np.full(len(rows) - count, compliance)
+            matrix = _with_compliance(G[np.ix_(rows, rows)], range(count, len(rows)), soft)
+            found = solve(larger, matrix, lower, NO_ROWS, tolerance=tolerance, attempts=ATTEMPTS[:3])
+            displacement = X[:, rows] @ found.impulses
+            if not self._is_fast(displacement):
+                break
+        taken = np.zeros(sets.size)
+        np.add.at(taken, rows, found.impulses)
+        names: list[Key] = [self._group(keys[k]) for k in range(count)]
+        for key in keys[len(keys) - len(self._constraints) :]:
+            names += [key] * self._rows_of(key[1])
+        self._keep_contradiction(G[np.ix_(part, part)], taken[part], wanted[part], names, deep)
+        return displacement
+
+    def _keep_contradiction(
+        self, G: Floats, impulses: Floats, wanted: Floats, names: Sequence[Key], deep: NDArray[np.intp]
+    ) -> None:
+        """Keep what opposes most the overlap or error of which most remains, in a displacement by impulses
+        (m,) on rows (m,) that `names` belong to."""
+        remaining = wanted + G @ impulses
+        rows: dict[Key, list[int]] = {}
+        for row, name in enumerate(names):
+            rows.setdefault(name, []).append(row)
+        errors = [*deep.tolist(), *(row for row, name in enumerate(names) if name[0] == CONSTRAINT)]
+        worst: tuple[float, Key] | None = None
+        for name, group in rows.items():
+            chosen = [row for row in group if row in errors]
+            unmet = float(np.linalg.norm(remaining[chosen]))
+            if unmet > UNMET * float(np.linalg.norm(wanted[chosen])) and (worst is None or unmet > worst[0]):
+                worst = unmet, name
+        if worst is None:
+            return
+        own = [row for row in rows[worst[1]] if row in errors]
+        opposing = {
+            name: float(remaining[own] @ G[np.ix_(own, group)] @ impulses[group])
+            for name, group in rows.items()
+            if name != worst[1]
+        }
+        strongest = max(opposing, key=opposing.__getitem__, default=None)
+        if strongest is not None and opposing[strongest] > 0.0:
+            self.contradiction = worst[1], strongest
+
+    def _is_fast(self, displacement: Floats) -> bool:
+        """Check whether a displacement at the velocity (nv,) moves any part faster than one may."""
+        speeds = (part.mean_speeds(displacement[self._columns[k]]) for k, part in self.parts.items())
+        return not all(bool((each <= MAX_DISPLACEMENT_SPEED).all()) for each in speeds)
 
     def _at_rest(
         self,
@@ -436,6 +511,10 @@ class Island:
         assert len(start) == size
         return start
 
+    def _group(self, key: Key) -> Key:
+        """Return one key for all contact points of two shapes, and the key itself for anything else."""
+        return (*key[:3], 0, 0) if key[0] == CONTACT else key
+
     def _rows_of(self, constraint: int) -> int:
         return 3 if self._constraints[constraint].kind == "point" else 6
 
@@ -461,6 +540,15 @@ class Island:
             for k, contact in enumerate(self.contacts)
         ]
         return touches, dict(zip(keys, values, strict=True))
+
+
+def _with_compliance(G: Floats, rows: Sequence[int], compliances: Floats) -> Floats:
+    """Return G (m, m) with compliances of some rows, in multiples of their entries on the diagonal."""
+    if not compliances.any():
+        return G
+    matrix: Floats = G.copy()
+    matrix[rows, rows] *= 1.0 + compliances
+    return matrix
 
 
 def _bears(warm: WarmStart, contact: PossibleContact) -> bool:

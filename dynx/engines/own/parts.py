@@ -228,6 +228,28 @@ class OwnRobot:
         symmetric: Floats = 0.5 * (inverse + inverse.T)
         return symmetric
 
+    @cached_property
+    def _masses(self) -> Floats:
+        """Mass (nv,) that each coordinate moves [kg]; a base moves the whole robot."""
+        mechanism = self.engine.model.mechanism
+        moved = [float(body.inertia.mass) for body in mechanism.bodies]
+        for k in range(len(moved) - 1, -1, -1):
+            if (parent := mechanism.bodies[k].parent) != ROOT:
+                moved[parent] += moved[k]
+        whole = float(mechanism.root.mass) + sum(float(body.inertia.mass) for body in mechanism.bodies)
+        masses = np.array([*[whole] * self._base, *moved])
+        if mechanism.coupling is not None:
+            masses = np.abs(mechanism.coupling.matrix()).T @ masses
+        return masses
+
+    def mean_speeds(self, u: Floats) -> Floats:
+        """Return the root of the mean square speed (nv,) [m/s] of what each coordinate moves, if it alone has
+        its entry of the velocity u (nv,)."""
+        M, masses = self._step.dynamics.mass_matrix(self.q), self._masses
+        squares = np.divide(np.diag(M), masses, out=np.zeros(self.nv), where=masses > 0.0)
+        speeds: Floats = np.abs(u) * np.sqrt(squares)
+        return speeds
+
     def finish(self) -> None:
         """Complete the free motion."""
         before = self.q

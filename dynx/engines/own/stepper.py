@@ -18,7 +18,7 @@ import numpy as np
 
 from dynx._version import __version__
 from dynx.backends.registry import BUILT_IN as BACKENDS
-from dynx.engines.own.impulses import Island, TouchImpulse, WarmStart
+from dynx.engines.own.impulses import CONSTRAINT, CONTACT, MAX_RESIDUAL, Island, Key, TouchImpulse, WarmStart
 from dynx.engines.own.parts import OwnBody, OwnRobot, robot_of
 from dynx.engines.own.touching import ContactFinder, PossibleContact
 from dynx.errors import UnsupportedFeatureError, shown
@@ -35,9 +35,6 @@ from dynx.steppers.robot_step import SCHEMES
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
 from dynx.steppers.stepper import Feature, Stepper, TouchingPoint
-
-MAX_RESIDUAL = 1e-6
-"""Residual of the impulses [m/s or rad/s] above which a step counts as not solved."""
 
 TOUCHING = 1e-9
 """Gap [m] up to which two surfaces touch, since poses are rounded."""
@@ -105,6 +102,7 @@ class OwnStepper(Stepper):
         self._warm: WarmStart = {}
         self._touches: list[TouchImpulse] | None = None
         self._largest_residual, self._unsolved, self._contradictory = 0.0, 0, 0
+        self._contradiction: tuple[Key, ...] = ()
         self._moving = self._parts()
         robots = len(self._robots)
         self._part_of: dict[Owner, int] = {}
@@ -182,7 +180,9 @@ class OwnStepper(Stepper):
             if not island.residual <= MAX_RESIDUAL:
                 self._unsolved += 1
                 self._largest_residual = max(self._largest_residual, island.residual)
-            self._contradictory += not island.displacement_residual <= MAX_RESIDUAL
+            if island.contradiction:
+                self._contradictory += 1
+                self._contradiction = self._contradiction or island.contradiction
         for k in sorted(alone):
             self._moving[k].finish()
         self._touches, self._warm = touches, warm
@@ -318,11 +318,25 @@ class OwnStepper(Stepper):
                 f"more than {MAX_RESIDUAL:g} m/s, at most by {self._largest_residual:.3g}"
             )
         if self._contradictory:
+            first = " and ".join(map(self._named, self._contradiction))
             found.append(
                 f"overlaps and errors of constraints contradicted each other {_times(self._contradictory)}, "
-                "so that the step took them back in part only"
+                f"first {first}, so that the step took them back in part only"
             )
         return found
+
+    def _named(self, key: Key) -> str:
+        """Return a noun phrase for what a key stands for."""
+        kind, first, second, *_ = key
+        if kind == CONSTRAINT:
+            constraint = self.layout.constraints[first]
+            kind_of = "weld" if constraint.kind == "weld" else "point-to-point constraint"
+            return f"the {kind_of} of {' and '.join(map(shown, constraint.names))}"
+        if kind == CONTACT and self._finder is not None:
+            return f"the contact of {' and '.join(map(shown, self._finder.names(first, second)))}"
+        robot = self.layout.robots[first]
+        joint = robot.model.coordinate_names[second - (6 if robot.model.floating else 0)]
+        return f"the limit of {shown(f'{robot.name}/{joint}')}"
 
     # -- end ----------------------------------------------------------------------------------
 

@@ -114,6 +114,11 @@ class ContactFinder:
                 ]
         return found
 
+    def names(self, a: int, b: int) -> tuple[str, str]:
+        """Return the names of the colliders of two shapes, by number."""
+        first, second = (self._colliders[int(self._collider[k])].name for k in (a, b))
+        return first, second
+
     def _new_pair(self, a: int, b: int) -> TouchablePair:
         i, j = int(self._collider[a]), int(self._collider[b])
         first, second = self._colliders[i], self._colliders[j]

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.engines.own.stepper import MAX_RESIDUAL, OwnStepper
+from dynx.engines.own.impulses import MAX_RESIDUAL
+from dynx.engines.own.stepper import OwnStepper
 from dynx.model.geometry import Collision, Cylinder, HeightField, Mesh
 from dynx.rbd.constraints import ConstraintSets, Residuals, Solution, solve
 from dynx.spatial.scalar import Floats
