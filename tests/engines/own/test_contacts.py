@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import dynx
 from dynx.engines.own.impulses import MAX_RESIDUAL
@@ -21,9 +24,11 @@ from dynx.world import (
     Material,
     PDMotor,
     PointToPoint,
+    PositionMotor,
     Scene,
     SceneBody,
     SceneRobot,
+    Weld,
     World,
     box,
     ground,
@@ -372,8 +377,71 @@ def test_overlaps_that_contradict_each_other_are_noted() -> None:
     with World(Scene("vice", bodies=(*walls, held)), "dynx", dt=1e-3) as world:
         assert not any("contradicted" in note for note in world.notes)
         world.step(2)
-        assert sum("contradicted each other 2 times" in note for note in world.notes) == 1
+        wanted = "contradicted each other 2 times, first the contact of "
+        (note,) = (note for note in world.notes if wanted in note)
+        assert {"'l' and 'held'", "'r' and 'held'"} == set(re.findall(r"'[lr]' and 'held'", note))
         assert abs(world.state.bodies["held"].position[0]) < 1e-6
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1 / 240, 1e-3]))
+def test_a_weld_through_a_contact_makes_no_kinetic_energy(seed: int, dt: float) -> None:
+    """The kinetic energy of cubes depends on their twists alone."""
+    random = np.random.default_rng(seed)
+    way = random.normal(size=3)
+    place = dynx.Pose(tuple(0.22 * way / np.linalg.norm(way)), tuple(random.uniform(-3.0, 3.0, 3)))
+    a = box("a", (0.2, 0.2, 0.2), mass=2.0, twist=tuple(random.uniform(-1.0, 1.0, 6)))
+    b = box("b", (0.1, 0.1, 0.1), mass=0.3, pose=place, twist=tuple(random.uniform(-1.0, 1.0, 6)))
+    weld = Weld("a", "b", dynx.Pose())
+    scene = Scene("drawn", bodies=(a, b), constraints=(weld,), gravity=(0, 0, 0))
+    inertias = {"a": (2.0, 2.0 * 0.2**2 / 6.0), "b": (0.3, 0.3 * 0.1**2 / 6.0)}
+    with World(scene, "dynx", dt) as world:
+        energy, gap = math.inf, 0.22
+        for _ in range(20):
+            world.step()
+            twists = {name: world.state.bodies[name].twist for name in inertias}
+            now = sum(
+                0.5
+                * (m * twists[name][:3] @ twists[name][:3] + inertia * twists[name][3:] @ twists[name][3:])
+                for name, (m, inertia) in inertias.items()
+            )
+            assert now <= energy + 1e-12
+            energy = now
+        state = world.state
+    assert np.linalg.norm(state.bodies["a"].position - state.bodies["b"].position) <= gap + 1e-9
+
+
+@pytest.mark.parametrize("dt", [1 / 240, 1e-3])
+def test_a_weld_through_a_contact_moves_an_arm_little_and_is_named(dt: float) -> None:
+    """The displacement that ends the error of the weld turns the whole arm for each millimetre."""
+    links = "".join(
+        f'<link name="l{k}"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>'
+        '<inertia ixx="0.005" iyy="0.03" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial><collision>'
+        '<origin xyz="0.2 0 0"/><geometry><box size="0.36 0.08 0.08"/></geometry></collision></link>'
+        f'<joint name="j{k}" type="continuous"><parent link="{parent}"/><child link="l{k}"/>'
+        f'<origin xyz="{x} 0 0"/><axis xyz="{axis}"/></joint>'
+        for k, (parent, x, axis) in enumerate(
+            [("base", 0.0, "0 1 0"), ("l0", 0.4, "1 0 0"), ("l1", 0.4, "0 1 0")]
+        )
+    )
+    model = dynx.load(f'<robot name="arm"><link name="base"/>{links}</robot>')
+    kinematics = dynx.backend("reference", model)
+    q = np.array([0.3, 0.4, -0.5])
+    T = kinematics.forward_kinematics(q, "l2")
+    beside = dynx.Pose(tuple(T[:3, 3] + T[:3, :3] @ [0.2, 0.03, 0.12]), (3.1, 0, 0))
+    block = box("block", (0.05, 0.05, 0.05), mass=0.1, pose=beside)
+    arm = SceneRobot("arm", model, q=q, motors=(PositionMotor(q, kp=2000.0, kd=200.0),))
+    weld = Weld("arm/l2", "block", dynx.Pose((0.2, 0, 0)))
+    scene = Scene("grasp", robots=(arm,), bodies=(block,), constraints=(weld,), gravity=(0, 0, 0))
+    with World(scene, "dynx", dt) as world:
+        world.run(0.15)
+        assert np.abs(world.state.robots["arm"].q - q).max() < 0.1
+        T = kinematics.forward_kinematics(world.state.robots["arm"].q, "l2")
+        middle = T[:3, 3] + T[:3, :3] @ [0.2, 0, 0]
+        # At the start it is 0.124 m.
+        assert np.linalg.norm(middle - world.state.bodies["block"].position) < 0.1
+        named = "first the weld of 'arm/l2' and 'block' and the contact of 'arm/l2' and 'block'"
+        assert any(named in note for note in world.notes)
 
 
 @pytest.mark.parametrize("dt", [4e-3, 1e-3])
