@@ -165,6 +165,14 @@ class ConstraintLayout:
     b: Anchor
     names: tuple[str, str]
     """Names of the parts at the ends, for messages."""
+    active: bool = True
+    """False if it does nothing until it is switched on; engines are given active ones only."""
+    collides: bool = True
+    """False if its ends do not collide with each other while it is active; `Layout.collides` of the layout
+    that an engine is given has that."""
+    held: bool = field(default=False, compare=False)
+    """True for a weld that keeps the pose in which it is switched on."""
+    name: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, eq=False)

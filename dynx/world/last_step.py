@@ -71,6 +71,11 @@ class LastStep:
         self._ties = bool(layout.constraints)
         self.forget()
 
+    def constrain(self, layout: Layout, in_engine: Layout) -> None:
+        """Go on with other constraints, and forget the step."""
+        self._layout, self._in_engine = layout, in_engine
+        self.forget()
+
     def forget(self) -> None:
         """Forget the step: the state was set."""
         self._before: WorldState | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NoReturn
 
 import numpy as np
@@ -213,6 +213,39 @@ class Motion:
         except BaseException as error:
             self._fail(error)
             raise
+
+    def rebuild(self, restore: Callable[[Stepper], object] | None = None) -> None:
+        """Go on at the present time in a new engine, and at the present state, or at one that `restore` sets.
+
+        Where that raises an error, the world stays as it is.
+        """
+        before, state = self.engine, self.state
+        engine = self._build()
+        try:
+            if restore is None:
+                apply_state(engine, state)
+            else:
+                restore(engine)
+        except BaseException:
+            engine.close()
+            raise
+        self._engine = self.ready = engine
+        before.close()
+        self._commands.forget()
+        self._state = None
+        self._read_and_keep()
+        self._state_at_start = self._kept[0]
+
+    def notes_on_begin(self, notes: Callable[[Stepper, WorldState], Sequence[str]]) -> Sequence[str]:
+        """Return what `notes` finds at the state in which the motion began."""
+        if self._state is self._state_at_start:
+            return notes(self.engine, self._state_at_start)
+        begun = self._build()
+        try:
+            apply_state(begun, self._state_at_start)
+            return notes(begun, self._state_at_start)
+        finally:
+            begun.close()
 
     def reset(self) -> None:
         """Return to the start of the scene in a new engine, at time 0."""

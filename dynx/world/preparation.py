@@ -188,6 +188,24 @@ def _with_provided_joints(robot: RobotLayout, provided: frozenset[Feature]) -> R
     return replace(elastic, friction=nothing) if Feature.DRY_FRICTION in missing else elastic
 
 
+def acting_layout(layout: Layout) -> Layout:
+    """Return the layout with the active constraints alone, whose ends collide as they let them."""
+    active = tuple(each for each in layout.constraints if each.active)
+    collides = layout.collides
+    for constraint in active:
+        if not constraint.collides:
+            ends = [
+                [k for k, each in enumerate(layout.colliders) if each.name == name]
+                for name in constraint.names
+            ]
+            if all(ends):
+                collides = collides.copy()
+                collides[np.ix_(ends[0], ends[1])] = collides[np.ix_(ends[1], ends[0])] = False
+    if len(active) == len(layout.constraints) and collides is layout.collides:
+        return layout
+    return replace(layout, constraints=active, collides=collides)
+
+
 def may_be_reached(layout: Layout, robot: int) -> bool:
     """Check whether contacts or constraints may act on a robot."""
     own = [k for k, collider in enumerate(layout.colliders) if collider.owner.robot == robot]
@@ -229,6 +247,15 @@ class _PartLookup:
 
     def constraint(self, constraint: Weld | PointToPoint) -> ConstraintLayout:
         """Return a constraint with its ends as frames in their owners."""
+        return replace(
+            self._at_anchors(constraint),
+            active=constraint.active,
+            collides=constraint.collides,
+            held=isinstance(constraint, Weld) and constraint.T_a_b is None,
+            name=constraint.name,
+        )
+
+    def _at_anchors(self, constraint: Weld | PointToPoint) -> ConstraintLayout:
         names = constraint.a, constraint.b
         (owner_a, T_a), (owner_b, T_b) = self._part(constraint.a), self._part(constraint.b)
         if isinstance(constraint, PointToPoint):

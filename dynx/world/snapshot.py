@@ -71,10 +71,14 @@ class Snapshot:
     versions."""
     rollout: int = 0
     """Number of the rollout of a world (`World.rollout`)."""
+    constraints: tuple[Floats | None, ...] = ()
+    """Pose (4, 4) of the first anchor of each constraint in its owner, None for one that is not active; empty
+    where none was switched since the start."""
 
     def _content(self) -> tuple[Any, ...]:
         arrays = tuple((name, x.shape, x.tobytes()) for name, x in self.arrays.items())
-        state = self.time, self.start, self.steps, arrays, self.data
+        constraints = tuple(None if each is None else each.tobytes() for each in self.constraints)
+        state = self.time, self.start, self.steps, arrays, self.data, constraints
         return self.engine, self.version, self.identity, *state
 
     def __eq__(self, other: object) -> bool:
@@ -147,6 +151,10 @@ def write_snapshot(path: str | os.PathLike[str], snapshot: Snapshot, world: dict
         ],
         "torques": [[x.hex() for x in snapshot.torques[name].tolist()] for name in _robots(world)],
         "rollout": snapshot.rollout,
+        "constraints": [
+            None if each is None else [x.hex() for x in each.ravel().tolist()]
+            for each in snapshot.constraints
+        ],
         "samples": {
             each if isinstance(each, str) else each.name: [[x.hex() for x in row] for row in rows.tolist()]
             for each, rows in snapshot.samples.items()
@@ -217,6 +225,10 @@ def _snapshot(header: dict[str, Any], robots: Sequence[str], data: bytes) -> Sna
         for name, rows in dict(header.get("samples") or {}).items()
         if rows
     }
+    constraints = tuple(
+        None if each is None else np.array([float.fromhex(x) for x in each]).reshape(4, 4)
+        for each in header.get("constraints") or ()
+    )
     engine, version, identity = (str(header[name]) for name in ("engine", "version", "identity"))
     time, start = (float.fromhex(header[name]) for name in ("time", "start"))
     steps = int(header["steps"])
@@ -232,6 +244,7 @@ def _snapshot(header: dict[str, Any], robots: Sequence[str], data: bytes) -> Sna
         torques=torques,
         samples=samples,
         rollout=int(header.get("rollout", 0)),
+        constraints=constraints,
     )
 
 

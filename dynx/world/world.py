@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types, described, takes
-from dynx.errors import ArgumentError, DTypeError, UnknownNameError, shown
+from dynx.errors import ArgumentError, DTypeError, UnknownNameError, nearest, shown
 from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
 from dynx.model.numbers import MAX_INDEX, checked_bool, positive_seconds, whole_number
@@ -26,12 +26,13 @@ from dynx.registry import door, explains_names
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import MAX_STEPS, refuse_too_many_steps, step_count
 from dynx.steppers.forces import ExternalForce
-from dynx.steppers.layout import Layout, RobotLayout
+from dynx.steppers.layout import ConstraintLayout, Layout, RobotLayout
 from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
 from dynx.steppers.registry import renderer_of, world_class
 from dynx.steppers.settings import changed_settings, checked_settings, ineffective_settings
 from dynx.steppers.state import BodyState, RobotState, WorldState
 from dynx.steppers.stepper import Stepper
+from dynx.world.boxes import owner_pose
 from dynx.world.commands import Commands, MotorsOf, RobotLoads, with_scene_motors
 from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, MeanContact, RayHits
 from dynx.world.motion import Motion, apply_state, checked_state
@@ -43,7 +44,7 @@ from dynx.world.notes import (
     notes_on_start,
     overlaps_of,
 )
-from dynx.world.preparation import JointDynamics, checked_options, layout_for, prepare
+from dynx.world.preparation import JointDynamics, acting_layout, checked_options, layout_for, prepare
 from dynx.world.scene.scene import MARGIN, Scene
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
 
@@ -142,9 +143,13 @@ def _feed(digest: Any, value: Any) -> None:
         _feed(digest, value.hull)
     elif is_dataclass(value):
         for field in fields(value):
-            # Files of earlier versions have robots without armature and joints without springs.
+            # Files of earlier versions have robots without armature and joints without springs, and all
+            # constraints active.
             added = field.name in _SPRING or (isinstance(value, RobotLayout) and field.name == "armature")
-            if field.compare and not (added and not np.any(getattr(value, field.name))):
+            left_out = added and not np.any(getattr(value, field.name))
+            if isinstance(value, ConstraintLayout) and field.name in _SWITCHES:
+                left_out = getattr(value, field.name)
+            if field.compare and not left_out:
                 _feed(digest, getattr(value, field.name))
     elif isinstance(value, tuple | list):
         digest.update(repr(len(value)).encode())
@@ -153,6 +158,9 @@ def _feed(digest: Any, value: Any) -> None:
     else:
         digest.update(repr(value).encode())
 
+
+_SWITCHES = ("active", "collides")
+"""Fields of constraints that are True in files of earlier versions."""
 
 TorquesOf = Mapping[str, ArrayLike]
 LoadsOf = Callable[["World"], Mapping[str, Any]]
@@ -224,6 +232,8 @@ class World:
         robots = {robot.name: k for k, robot in enumerate(self._layout.robots)}
         bodies = {body.name: k for k, body in enumerate(self._layout.bodies)}
         self._in_engine = layout_for(self._kind, self._layout)
+        self._constraints = self._layout.constraints
+        """The constraints of the scene as they are now."""
         self._commands = Commands(
             self._layout, self._in_engine, robots, bodies, self.dt / self.substeps, self._kind
         )
@@ -236,7 +246,8 @@ class World:
             # Imported here, because most worlds do not need it.
             from dynx.world.last_step import LastStep
 
-            self._last_step = LastStep(self._layout, self._in_engine, self._commands, self.dt / self.substeps)
+            layouts = self._with_constraints(self._layout), self._with_constraints(self._in_engine)
+            self._last_step = LastStep(*layouts, self._commands, self.dt / self.substeps)
         if scene.sensors and self._last_step is not None:
             from dynx.world.sensing import WorldSensors
 
@@ -266,19 +277,26 @@ class World:
         self._watchers = [each for each in watchers if each is not None]
         """What is read around every step of the engine."""
         self._given = settings
-        self._notes = self.notes_on_present_state()
+        self._notes: tuple[str, ...] | None = self.notes_on_present_state()
+        self._notes_at_start = self._notes
+        self._notes_of_earlier_engines: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences on parts that overlap at the start, constraints that the start violates, joints beyond
-        their limits, robots whose accelerations have no bound, parts that are too fast for the step,
+        their limits, robots whose accelerations have no bound, parts that are too fast for the step (after
+        `set_state` and `set_active`, all of these at that state),
         coefficients of contact that the engine does not have, joint dynamics that are not exact, a step that
         is long, angles of the scene that look like degrees, and given settings that the engine changes.
         Targets of motors in later steps that look like degrees follow, gains of motors that are unstable at
         the start in steps of the engine, and faults that the engine found in its steps."""
         engine = self._motion.ready
         of_steps = () if engine is None else engine.notes()
-        return tuple(dict.fromkeys((*self._notes, *self._commands.notes(), *of_steps)))
+        if self._notes is None:
+            at_start = self._motion.notes_on_begin(notes_on_start)
+            self._notes = (*at_start, *self._lasting_notes(self._given))
+        earlier = self._notes_of_earlier_engines
+        return tuple(dict.fromkeys((*self._notes, *self._commands.notes(), *earlier, *of_steps)))
 
     @property
     def version(self) -> str:
@@ -504,11 +522,95 @@ class World:
         self._forget_steps()
         clock = None if state is None else (checked.time, 0)
         self._motion.change(lambda engine: apply_state(engine, checked), clock)
+        self._notes = None
 
     def reset(self) -> None:
-        """Return to the initial state of the scene, at time 0."""
+        """Return to the initial state of the scene, at time 0, with the constraints that are active there."""
         self._forget_steps()
+        self._use_constraints(self._layout.constraints)
         self._motion.reset()
+        self._notes, self._notes_of_earlier_engines = self._notes_at_start, ()
+
+    @checks_types
+    def set_active(self, constraint: str | int, active: bool = True) -> None:
+        """Switch a constraint of the scene on or off, by its name or its number.
+
+            world.set_active("grip")         # Weld("arm/hand", "cup", name="grip", active=False)
+            world.set_active("grip", False)
+
+        A weld without `T_a_b` keeps the relative pose that its ends have when it is switched on. Other
+        constraints pull their ends together. State and time stay the same. The scene goes on in a new
+        engine, which takes as long as making the world. So `contacts` has no forces until the next step, and
+        `joint_wrenches` needs a step first. Nothing happens to a constraint that is active already.
+
+        Raises UnknownNameError, ArgumentError for a number, and the errors of making a world, after which
+        everything is as before.
+        """
+        k = self._constraint_number(constraint)
+        active = checked_bool("active", active)
+        state, found = self._motion.state, self._constraints[k]
+        if found.active == active:
+            return
+        if active and found.held:
+            owners = (owner_pose(self._layout, end.owner, state) for end in (found.a, found.b))
+            T_a, T_b = owners
+            found = replace(found, a=found.a._replace(T=np.linalg.inv(T_a) @ T_b @ found.b.T))
+        changed = list(self._constraints)
+        changed[k] = replace(found, active=active)
+        self._rebuild(tuple(changed))
+
+    @checks_types
+    def is_active(self, constraint: str | int) -> bool:
+        """Check whether a constraint of the scene acts, by its name or its number.
+
+        Raises UnknownNameError, and ArgumentError for a number."""
+        return self._constraints[self._constraint_number(constraint)].active
+
+    def _constraint_number(self, constraint: str | int) -> int:
+        numbers = {each.name: k for k, each in enumerate(self._constraints) if each.name}
+        if isinstance(constraint, str):
+            if constraint not in numbers:
+                known = nearest(constraint, numbers) if numbers else "; none of its constraints has a name"
+                raise UnknownNameError(f"no constraint {shown(constraint)} in {self.scene.name}{known}")
+            return numbers[constraint]
+        if not self._constraints:
+            raise ArgumentError(f"{self.scene.name} has no constraints")
+        return whole_number("constraint", constraint, 0, len(self._constraints) - 1)
+
+    def _rebuild(
+        self,
+        constraints: tuple[ConstraintLayout, ...],
+        restore: Callable[[Stepper], object] | None = None,
+    ) -> None:
+        """Go on in a new engine with other constraints, at the present state or at one that is restored."""
+        before, notes = self._constraints, tuple(self._motion.engine.notes())
+        self._constraints = constraints
+        try:
+            self._motion.rebuild(restore)
+        except BaseException:
+            self._constraints = before
+            raise
+        self._use_constraints(constraints)
+        self._notes_of_earlier_engines += notes
+        self._forget_steps()
+        self._notes = None
+
+    def _use_constraints(self, constraints: tuple[ConstraintLayout, ...]) -> None:
+        """Take constraints as the present ones."""
+        self._constraints = constraints
+        if self._last_step is not None:
+            layouts = self._with_constraints(self._layout), self._with_constraints(self._in_engine)
+            self._last_step.constrain(*layouts)
+
+    def _with_constraints(self, layout: Layout) -> Layout:
+        """Return a layout with the constraints that act now."""
+        return acting_layout(replace(layout, constraints=self._constraints))
+
+    def _switched(self) -> tuple[Floats | None, ...]:
+        """Return the constraints as a snapshot has them."""
+        if self._constraints == self._layout.constraints:
+            return ()
+        return tuple(each.a.T.copy() if each.active else None for each in self._constraints)
 
     def _forget_steps(self) -> None:
         """Forget what was read around the last steps: they did not lead to the present state."""
@@ -529,6 +631,7 @@ class World:
             torques=dict(self.state.torques),
             samples={} if self._sensors is None else self._sensors.kept(),
             rollout=self._rollout,
+            constraints=self._switched(),
         )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -549,6 +652,16 @@ class World:
         self.rollout = snapshot.rollout
         if self._sensors is not None:
             self._sensors.restore(snapshot.samples)
+        constraints = self._layout.constraints
+        if snapshot.constraints:
+            constraints = tuple(
+                replace(each, active=False)
+                if T is None
+                else replace(each, active=True, a=each.a._replace(T=T))
+                for each, T in zip(constraints, snapshot.constraints, strict=True)
+            )
+        if self._switched() or snapshot.constraints:
+            self._rebuild(constraints)
         self._motion.change(load, (snapshot.start, snapshot.steps))
 
     @checks_types
@@ -693,12 +806,23 @@ class World:
         self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None
     ) -> Avoidance:
         """Return the obstacles of a robot at the present state, with their margins (`Scene.avoidance`)."""
-        return scene_at(self.scene, self.state).avoidance(robot, margin=margin, self_margin=self_margin)
+        return self._scene_now().avoidance(robot, margin=margin, self_margin=self_margin)
 
     @checks_types
     def avoidance_for(self, model: Model) -> Avoidance:
         """Return what the robot that is `model` keeps away from now, with the default margin."""
-        return scene_at(self.scene, self.state).avoidance_for(model)
+        return self._scene_now().avoidance_for(model)
+
+    def _scene_now(self) -> Scene:
+        """Return the scene at the present state, with the constraints that act now."""
+        scene, now = scene_at(self.scene, self.state), self._constraints
+        if now is self._layout.constraints:
+            return scene
+        constraints = tuple(
+            replace(each, active=each_now.active)
+            for each, each_now in zip(scene.constraints, now, strict=True)
+        )
+        return replace(scene, constraints=constraints)
 
     @checks_types
     def aabb(self, name: str) -> tuple[Floats, Floats]:
@@ -771,4 +895,5 @@ class World:
         yield from ineffective_settings(self._kind.settings, self.settings)
 
     def _build(self) -> Stepper:
-        return open_engine(self._kind, self._in_engine, self.dt / self.substeps, self.settings)
+        layout = self._with_constraints(self._in_engine)
+        return open_engine(self._kind, layout, self.dt / self.substeps, self.settings)

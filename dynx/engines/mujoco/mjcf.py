@@ -576,7 +576,11 @@ class MjcfDocument:
                 # A site of group 3 is not drawn unless it is asked for.
                 pose = carrier.placement(anchor.T[:3, :3], anchor.T[:3, 3])
                 SubElement(carrier.body, "site", {"name": name, "group": "3", **pose})
-            SubElement(self._equality, tags[constraint.kind], site1=sites[0], site2=sites[1])
+            switches = {} if constraint.active else {"active": "false"}
+            if constraint.name:
+                switches["name"] = constraint.name
+            ends = {"site1": sites[0], "site2": sites[1]}
+            SubElement(self._equality, tags[constraint.kind], ends | switches)
 
     def _add_sensor(self, sensor: SensorLayout) -> None:
         """Add the elements of a sensor, named by it and by what they measure.

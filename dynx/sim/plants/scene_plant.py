@@ -63,7 +63,7 @@ class ScenePlant:
         for each in self.scene.constraints:
             ends = [end.partition("/")[0] == self.robot for end in (each.a, each.b)]
             # A constraint between two links of the robot is internal to it.
-            if any(ends) and not (base and all(ends)):
+            if each.active and any(ends) and not (base and all(ends)):
                 return (
                     f"a {type(each).__name__} holds {shown(each.a)} to {shown(each.b)}, and a rollout has no "
                     "forces of constraints; World(keep_last_step=True) has them in joint_wrenches() and its "

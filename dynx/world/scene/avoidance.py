@@ -179,7 +179,7 @@ def _carried(
         f"{robot.name}/{link.name}": (link.name, _IDENTITY) for link in robot.model.links
     }
     found: dict[str, tuple[str, Floats]] = {}
-    welds = [each for each in constraints if isinstance(each, Weld)]
+    welds = [each for each in constraints if isinstance(each, Weld) and each.active]
     while True:
         before = len(found)
         for weld in welds:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypedDict
 
@@ -32,7 +32,7 @@ from dynx.model.geometry import (
     solid_properties,
 )
 from dynx.model.geometry.links import Colour
-from dynx.model.numbers import checked_array, finite_numbers, finite_vector, positive_number
+from dynx.model.numbers import checked_array, checked_bool, finite_numbers, finite_vector, positive_number
 from dynx.model.urdf.reader import inertia_fault
 from dynx.spatial.scalar import Floats
 from dynx.steppers.material import DEFAULT_MATERIAL, Material, checked_material
@@ -263,15 +263,21 @@ def body_to_urdf(body: SceneBody) -> str:
 class Weld:
     """A rigid connection of `a` and `b`: each a body, ``robot/link`` or ``world``.
 
-    `T_a_b` is the pose of frame b in frame a; None keeps their relative pose at the start.
+    `T_a_b` is the pose of frame b in frame a. None keeps their relative pose at the start, or that in which
+    `World.set_active` switches the weld on. A weld that is not `active` does nothing until then. With
+    `collides=False` its two ends do not touch each other while it acts. `name` is for `World.set_active`.
     """
 
     a: str
     b: str
     T_a_b: Pose | None = None
+    name: str = field(default="", kw_only=True)
+    active: bool = field(default=True, kw_only=True)
+    collides: bool = field(default=True, kw_only=True)
 
     def __post_init__(self) -> None:
         _check_ends(self)
+        _check_switches(self)
         if self.T_a_b is not None:
             object.__setattr__(self, "T_a_b", checked_pose("T_a_b of a weld", self.T_a_b))
 
@@ -281,21 +287,33 @@ class Weld:
 class PointToPoint:
     """A ball joint: `point_a` (3,) [m] of `a` stays at `point_b` of `b`, each in the frame of its end.
 
-    Each end is a body, ``robot/link`` or ``world``.
+    Each end is a body, ``robot/link`` or ``world``. `name`, `active` and `collides` are those of a `Weld`.
     """
 
     a: str
     b: str
     point_a: Vector = ZERO
     point_b: Vector = ZERO
+    name: str = field(default="", kw_only=True)
+    active: bool = field(default=True, kw_only=True)
+    collides: bool = field(default=True, kw_only=True)
 
     def __post_init__(self) -> None:
         _check_ends(self)
+        _check_switches(self)
         for name in ("point_a", "point_b"):
             object.__setattr__(self, name, finite_vector(f"{name} of a constraint", getattr(self, name)))
 
 
 Constraint = Weld | PointToPoint
+
+
+def _check_switches(constraint: Constraint) -> None:
+    kind = type(constraint).__name__
+    if constraint.name != "":
+        checked_name(kind, constraint.name)
+    for name in ("active", "collides"):
+        object.__setattr__(constraint, name, checked_bool(f"{name} of a {kind}", getattr(constraint, name)))
 
 
 def _check_ends(constraint: Constraint) -> None:

@@ -173,7 +173,8 @@ class BodyDocument:
 
 @dataclass
 class ConstraintDocument:
-    """A weld, with the pose of the frame of `b` in that of `a`, or a point-to-point constraint."""
+    """A weld, with the pose of the frame of `b` in that of `a`, or a point-to-point constraint; see
+    `dynx.world.Weld`."""
 
     kind: Literal["weld", "point"]
     a: str
@@ -181,6 +182,9 @@ class ConstraintDocument:
     pose: Vector | None = None
     point_a: Vector | None = None
     point_b: Vector | None = None
+    name: str = ""
+    active: bool = True
+    collides: bool = True
 
 
 @dataclass
@@ -472,14 +476,16 @@ def _solid(given: ShapeDocument, paths: ScenePaths) -> Shape:
 
 def _constraint(given: ConstraintDocument) -> Constraint:
     points = {name: getattr(given, name) for name in ("point_a", "point_b")}
+    switches: dict[str, Any] = {name: getattr(given, name) for name in ("name", "active", "collides")}
     if given.kind == "weld":
         for name, point in points.items():
             if point is not None:
                 raise ArgumentError(f"a weld has no {name}; wanted pose, that of the frame of b in that of a")
-        return Weld(given.a, given.b, _pose("pose", given.pose))
+        return Weld(given.a, given.b, _pose("pose", given.pose), **switches)
     if given.pose is not None:
         raise ArgumentError("a point-to-point constraint has no pose; wanted point_a and point_b")
-    return PointToPoint(given.a, given.b, **{name: point or ZERO for name, point in points.items()})
+    at_a, at_b = (point or ZERO for point in points.values())
+    return PointToPoint(given.a, given.b, at_a, at_b, **switches)
 
 
 def _material(given: MaterialDocument | None) -> Material:
@@ -662,13 +668,15 @@ def _shape_document(placed: Collision, paths: ScenePaths) -> ShapeDocument:
 
 
 def _constraint_document(constraint: Constraint) -> ConstraintDocument:
+    found = ConstraintDocument("weld", constraint.a, constraint.b)
+    for name in ("name", "active", "collides"):
+        setattr(found, name, getattr(constraint, name))
     if isinstance(constraint, Weld):
-        pose = constraint.T_a_b
-        return ConstraintDocument(
-            "weld", constraint.a, constraint.b, None if pose is None else pose_numbers(pose)
-        )
-    points = list(constraint.point_a), list(constraint.point_b)
-    return ConstraintDocument("point", constraint.a, constraint.b, None, *points)
+        found.pose = None if constraint.T_a_b is None else pose_numbers(constraint.T_a_b)
+        return found
+    found.kind = "point"
+    found.point_a, found.point_b = list(constraint.point_a), list(constraint.point_b)
+    return found
 
 
 def _material_document(material: Material) -> MaterialDocument | None:

@@ -73,6 +73,7 @@ class _SceneReader:
         self._bodies: list[SceneBody] = []
         self._colliders: list[MjcfCollider] = []
         self._taken: set[str] = {WORLD}
+        self._constraint_names: set[str] = {WORLD}
         self._places: dict[str, _BodyPlace] = {}
         self._originals = {id(body.element): body for tree in trees.trees for body in tree.bodies}
         self._joint_owners: dict[str, int] = {}
@@ -306,14 +307,15 @@ class _SceneReader:
     # -- equality constraints -------------------------------------------------------------------
 
     def _equalities(self) -> Iterator[Element]:
-        """Yield the equality constraints that act."""
+        """Yield the equality constraints that act, or that a world may switch on."""
         flag = self._document.options.disabled("equality")
         if flag is not None:
             self._reading.note(flag, "equality constraints are disabled, and none is read")
             return
         for element in self._document.sections("equality"):
             resolved = self._document.resolved(element, None, "equality")
-            if resolved.attributes.get("active", "true") == "false":
+            switched = element.tag in ("connect", "weld")
+            if not switched and resolved.attributes.get("active", "true") == "false":
                 self._reading.note(element, f"<{element.tag}> of <equality> is not active, and is not read")
             else:
                 yield resolved
@@ -383,13 +385,16 @@ class _SceneReader:
                 element, f"{what} connects {shown(a)} and {shown(b)}, rigid already, and is not read"
             )
             return
+        name = element.attributes.get("name", "")
+        name = self._free_name(name, self._constraint_names) if name else ""
+        active = reading.flag(element, "active", what, default=True)
         if element.tag == "weld":
-            yield Weld(a, b, Pose.from_matrix(T_a @ inverse(T_b)))
+            yield Weld(a, b, Pose.from_matrix(T_a @ inverse(T_b)), name=name, active=active)
             return
         x, y, z = T_a[:3, 3].tolist()
         point: Vector = (x, y, z)
         x, y, z = T_b[:3, 3].tolist()
-        yield PointToPoint(a, b, point, (x, y, z))
+        yield PointToPoint(a, b, point, (x, y, z), name=name, active=active)
 
     def _ends(self, element: Element, what: str) -> tuple[str, str, Floats, Floats]:
         """Return the parts that a constraint connects, and the pose (4, 4) in each that coincides."""

@@ -89,6 +89,10 @@ class Scene:
                 self.require(name)
         for constraint in self.constraints:
             self._check_constraint(constraint)
+        named = [each.name for each in self.constraints if each.name]
+        for name in named:
+            if named.count(name) > 1:
+                raise ArgumentError(f"two constraints are called {shown(name)}; wanted different names")
         if not isinstance(self.sensors, tuple) or self.sensors:
             # Imported here, because most scenes have none.
             from dynx.world.sensors.sensor import checked_sensors
