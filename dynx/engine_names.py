@@ -26,7 +26,11 @@ _STATE = f"{_POSITIONS} and {_VELOCITIES}"
 _POSE_OF_BODY = f"World.state.bodies[name].T_world_body of a body; {_POSITIONS}[:7] of a floating base"
 _SET_STATE = "World.set_state(...), or SceneRobot(q=..., v=...) at the start"
 _SHAPES = "dynx.world.box, sphere, cylinder, capsule or mesh, for a body in Scene(bodies=...)"
-_CONSTRAINT = "dynx.world.PointToPoint or Weld, in Scene(constraints=...)"
+_SWITCH = "World.set_active(name, active), with the name of the constraint"
+_CONSTRAINT = (
+    "dynx.world.PointToPoint or Weld, in Scene(constraints=...); with active=False, World.set_active(name) "
+    "switches it on during a run"
+)
 _FORCE = "dynx.ExternalForce(part, wrench), in World.step(forces=[...])"
 _CAMERA = "World.camera(dynx.world.Camera(...))"
 _WHOLE_STEP = "World.step(torques={robot: tau}), which does mj_step1 and mj_step2 together"
@@ -95,7 +99,7 @@ PYBULLET = {
     "rayTest": "World.cast_rays(origins, directions)",
     "rayTestBatch": "World.cast_rays(origins, directions)",
     "removeBody": "a Scene without the body, in a new World",
-    "removeConstraint": "a Scene without the constraint, in a new World",
+    "removeConstraint": _SWITCH,
     "resetBasePositionAndOrientation": _SET_STATE,
     "resetBaseVelocity": _SET_STATE,
     "resetDebugVisualizerCamera": "`viewer.look_from(dynx.world.Camera.look_at(...))`, where `viewer` is "
@@ -109,7 +113,8 @@ PYBULLET = {
     "setAdditionalSearchPath": "dynx.load(path, package_dirs=[...]); dynx.load('r2d2.urdf') finds this "
     "file of pybullet_data without `package_dirs`",
     "setCollisionFilterGroupMask": "Scene.ignored, the pairs of parts that do not collide",
-    "setCollisionFilterPair": "Scene.ignored, the pairs of parts that do not collide",
+    "setCollisionFilterPair": "Scene.ignored, the pairs of parts that do not collide; for the ends of a Weld "
+    "while it acts, its `collides=False`",
     "setGravity": "`gravity=(0, 0, -9.81)`, an argument of Scene and of dynx.load",
     "setJointMotorControl": _MOTORS,
     "setJointMotorControl2": _MOTORS,
@@ -182,6 +187,7 @@ _FIXED = "no such call, because a mocap body is fixed in a Scene; World.set_stat
 _FORCES_OF_ACTUATORS = "Model.actuator_forces(ctrl, q, v)"
 
 MUJOCO = {
+    "eq_active": _SWITCH,
     "MjData": "World(scene, engine='mujoco'), whose state is World.state",
     "MjModel": f"{_LOADED} for a robot; for a scene World(scene, engine='mujoco'), where `scene` is "
     "dynx.world.read_scene(path)",
@@ -250,6 +256,7 @@ DRAKE = {
     "MultibodyPlant": "dynx.backend('drake', model) for its dynamics, or World(scene, engine='drake')",
     "SetPositions": _SET_STATE,
     "SetVelocities": _SET_STATE,
+    "SetConstraintActiveStatus": _SWITCH,
     "Simulator": "World(scene, engine='drake'), then World.run(duration)",
     "get_generalized_acceleration_output_port": _ACCELERATION,
     "num_positions": "Model.nq",

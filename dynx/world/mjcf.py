@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from dynx.argument_types import checks_types
@@ -14,7 +15,13 @@ from dynx.steppers.layout import Layout
 from dynx.steppers.materials import STRICT_MATERIALS, inexact_materials
 from dynx.steppers.settings import checked_settings
 from dynx.steppers.stepper import Stepper
-from dynx.world.preparation import JointDynamics, checked_options, may_be_reached, prepare
+from dynx.world.preparation import (
+    JointDynamics,
+    acting_layout,
+    checked_options,
+    may_be_reached,
+    prepare,
+)
 from dynx.world.scene.scene import Scene
 from dynx.world.sensors.kinds import ForceTorqueSensor
 
@@ -90,7 +97,8 @@ def layout_to_mjcf(
     Raises the errors of `scene_to_mjcf`.
     """
     h = options["dt"] / options["substeps"]
-    document = MjcfDocument(layout, h, checked_settings("mujoco", SETTINGS, settings))
+    start = replace(layout, collides=acting_layout(layout).collides)
+    document = MjcfDocument(start, h, checked_settings("mujoco", SETTINGS, settings))
     for refused in document.refused:
         raise refused.error
     return document.text(
@@ -148,6 +156,10 @@ def _remarks(
     """Yield what the document of a world cannot carry, whatever its engine."""
     if options["substeps"] > 1:
         yield f"A step of the world, {options['dt']!r} s, is {options['substeps']} steps of the document."
+    for constraint in layout.constraints:
+        if not constraint.collides:
+            do = "never touch" if constraint.active else "also touch while it acts"
+            yield f"{' and '.join(constraint.names)}, the ends of a constraint with collides=False, {do}."
     for number, robot in enumerate(scene.robots):
         friction = layout.robots[number].friction
         if engine is None:

@@ -65,7 +65,10 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         {"bodies": [{**BODY, "materials": {}}]},
         "bodies[0], 'cube' has no key 'materials'; did you mean 'material'?",
     ),
-    "unknown key far from all": ({"constraints": [{"zzz": 1}]}, "has no key 'zzz'; known: kind, a, b, pose"),
+    "unknown key far from all": (
+        {"constraints": [{"zzz": 1}]},
+        "has no key 'zzz'; 9 are known, such as kind, a",
+    ),
     "other version": ({"schema": "dynx.scene/2"}, "schema is 'dynx.scene/2'; wanted schema = 'dynx.scene/1'"),
 }
 

@@ -408,7 +408,7 @@ def test_a_linear_coupling_of_joints_is_a_mimic_joint() -> None:
         ('<joint joint1="hinge"/>', "hinge"),
         ('<joint joint1="hinge" polycoef="0 1 1"/>', "hinge"),
         ('<tendon tendon1="t"/>', "tendon"),
-        ('<weld body1="ball" active="false"/>', "weld"),
+        ('<joint joint1="hinge" active="false"/>', "joint"),
         ('<weld body1="arm"/>', "weld"),
     ],
 )
@@ -416,6 +416,19 @@ def test_constraints_that_a_scene_has_not_are_noted(element: str, named: str) ->
     scene = read(TWO.replace("</mujoco>", f"\n<equality>{element}</equality></mujoco>"))
     assert not scene.constraints
     assert any(named in note.message and note.line == 10 for note in scene.notes)
+
+
+def test_inactive_welds_and_connections_are_read_with_their_names() -> None:
+    welded = '<weld name="grip" body1="ball" active="false"/>'
+    joined = '<connect name="grip" body1="ball" anchor="0 0 0"/>'
+    scene = read(TWO.replace("</mujoco>", f"<equality>{welded}{joined}</equality></mujoco>"))
+    weld, point = scene.constraints
+    assert (weld.name, weld.active, point.name, point.active) == ("grip", False, "grip_2", True)
+    assert isinstance(weld, Weld)
+    assert weld.T_a_b is not None  # MuJoCo draws the ends to the pose of the file
+    pytest.importorskip("mujoco")
+    again = read(scene_to_mjcf(scene))
+    assert [(each.name, each.active) for each in again.constraints] == [("grip", False), ("grip_2", True)]
 
 
 # -- keyframes --------------------------------------------------------------------------------------
