@@ -400,11 +400,10 @@ def test_a_weld_through_a_contact_makes_no_kinetic_energy(seed: int, dt: float) 
         for _ in range(20):
             world.step()
             twists = {name: world.state.bodies[name].twist for name in inertias}
-            now = sum(
-                0.5
-                * (m * twists[name][:3] @ twists[name][:3] + inertia * twists[name][3:] @ twists[name][3:])
-                for name, (m, inertia) in inertias.items()
-            )
+            now = 0.0
+            for name, (mass, inertia) in inertias.items():
+                linear, angular = twists[name][:3], twists[name][3:]
+                now += 0.5 * float(mass * linear @ linear + inertia * angular @ angular)
             assert now <= energy + 1e-12
             energy = now
         state = world.state
