@@ -64,16 +64,15 @@ class LastStep:
     def __init__(self, layout: Layout, in_engine: Layout, commands: Commands, h: float) -> None:
         """`in_engine` is the layout with the joint dynamics that the engine has, `h` the length of the
         engine's steps [s]."""
-        self._layout, self._in_engine = layout, in_engine
         self._robots = {robot.name: k for k, robot in enumerate(layout.robots)}
         self._models = [robot.model for robot in layout.robots]
         self._commands, self._h = commands, h
-        self._ties = bool(layout.constraints)
-        self.forget()
+        self.constrain(layout, in_engine)
 
     def constrain(self, layout: Layout, in_engine: Layout) -> None:
         """Go on with other constraints, and forget the step."""
         self._layout, self._in_engine = layout, in_engine
+        self._ties = bool(layout.constraints)
         self.forget()
 
     def forget(self) -> None:

@@ -165,3 +165,18 @@ def test_only_constraints_of_the_scene_are_switched(engine: str) -> None:
         assert (world.is_active(0), world.is_active(1)) == (True, False)
     with pytest.raises(ArgumentError, match="two constraints are called 'grip'"):
         Scene("s", bodies=(body,), constraints=(held[0], Weld("world", "body", name="grip")))
+
+
+def test_wrenches_are_those_of_the_constraints_that_act(engine: str) -> None:
+    body = box("body", (0.1, 0.1, 0.1), mass=2.0)
+    grip = Weld("world", "body", name="grip", active=False)
+    scene = Scene("s", bodies=(body,), constraints=(PointToPoint("body", "world", active=False), grip))
+    with World(scene, engine, keep_last_step=True) as world:
+        world.step()
+        assert world.constraint_wrenches() == ()
+        world.set_state(bodies={"body": (Pose(), None)})
+        world.set_active("grip")
+        world.step(100)
+        (held,) = world.constraint_wrenches()
+        assert (held.kind, held.a, held.b) == ("weld", "world", "body")
+        assert_allclose(held.on_b[:3], [0.0, 0.0, 2.0 * 9.81], rtol=0.0, atol=0.02)
