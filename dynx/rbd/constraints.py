@@ -20,9 +20,10 @@ plus that of further impulses, without friction, which end a part of each overla
 
 **Contradictions.** A weld may pull a body into the part that it touches. Near such places the displacement
 that meets all rows is long: the whole robot turns for millimetres of one error. Beyond them there is none.
-Where it would be faster than `MAX_DISPLACEMENT_SPEED`, or does not exist, errors are *compliant*: a row of a
-compliance s has w + s g x = 0 in place of w = 0. Then the displacement minimises its kinetic energy plus that
-of what remains of the errors, and where errors and contacts balance it is zero.
+Where it would be faster than `MAX_DISPLACEMENT_SPEED` in an island with constraints, or does not exist,
+errors are *compliant*: a row of a compliance s has w + s g x = 0 in place of w = 0. Then the displacement
+minimises its kinetic energy plus that of what remains of the errors, and where errors and contacts balance it
+is zero.
 
 **Sweeps** (projected Gauss-Seidel) visit one set after the other: x becomes the point of the set closest to
 x - w / g, with the largest eigenvalue g of the set's block of G. A fixed point is a solution. One sweep is

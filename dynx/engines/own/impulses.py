@@ -405,7 +405,9 @@ class Island:
             smaller, G[np.ix_(part, part)], wanted[part], NO_ROWS, tolerance=tolerance, attempts=ATTEMPTS[:3]
         )
         displacement: Floats = X[:, part] @ found.impulses
-        if float(found.residuals.largest) <= MAX_RESIDUAL and not self._is_fast(displacement):
+        # Overlaps alone are taken back as in compiled steps (`dynx.rbd.contact_step`), however fast.
+        fast = bool(self._constraints) and self._is_fast(displacement)
+        if float(found.residuals.largest) <= MAX_RESIDUAL and not fast:
             return displacement
         # Overlaps may not grow by the displacement, but need not be taken back.
         deep = np.flatnonzero(wanted[part[:count]] < 0.0)
