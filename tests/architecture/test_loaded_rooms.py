@@ -89,7 +89,7 @@ FLOWS = {
         ),
         (),
         152,
-        25570,
+        25650,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"

@@ -209,14 +209,6 @@ _TYPES: dict[str, JointType] = {
     "continuous": "continuous",
     "prismatic": "prismatic",
     "fixed": "fixed",
-    "spherical": "ball",
-}
-"""Types of URDF, and ``spherical``, an extension that PyBullet and MuJoCo read."""
-
-_REFUSED = {
-    "planar": "two prismatic joints and a continuous one, with massless links between them",
-    "floating": "base='floating' where the root moves freely, or three prismatic and three revolute joints",
-    "ball": 'type="spherical", or three revolute joints, with massless links between them',
 }
 _READ = frozenset(["origin", "parent", "child", "axis", "limit", "dynamics", "mimic"])
 _KNOWN_IN_JOINT = _READ | {"calibration", "safety_controller", "gazebo", LOCKED_TAG, FRAME_TAG, SPRING_TAG}
@@ -257,20 +249,9 @@ def _read_type(element: Element, what: str, reading: Reading, floating_is_base: 
         raise reading.error(element, f"{what} has no type; wanted one of {', '.join(_TYPES)}")
     if kind in _TYPES:
         return _TYPES[kind]
-    if kind == "floating" and floating_is_base:
-        reading.note(
-            element,
-            f"{what} is a floating joint below an empty root link: it is read as fixed, "
-            "and base='floating' lets the robot move freely",
-        )
-        return "fixed"
-    if kind in _REFUSED:
-        raise reading.unsupported(element, f"{what} is {kind}, which is not supported; use {_REFUSED[kind]}")
-    raise reading.error(element, f"{what} has the unknown type {shown(kind)}{nearest(kind, _TYPES)}")
+    from dynx.model.urdf.other_joint_types import read_other_type
 
-
-_SWINGS = ("lower", "upper", "twist")
-"""Attributes of the ``<limit>`` of a spherical joint that are angles in PyBullet: swings and twist."""
+    return read_other_type(element, kind, what, reading, floating_is_base, _TYPES)
 
 
 def _read_axis(element: Element, what: str, reading: Reading) -> Vector:
@@ -313,13 +294,9 @@ def _read_limits(element: Element, kind: JointType, what: str, reading: Reading)
         elif most[attribute] < 0.0:
             reading.note(limit, f"the {attribute} limit of {what} is negative")
     if kind == "ball":
-        swings = [name for name in _SWINGS if name in limit.attributes]
-        if swings:
-            reading.note(
-                limit,
-                f"{what} is spherical; its limits ({', '.join(swings)}) were ignored: PyBullet alone has "
-                "them, as angles of swing and twist",
-            )
+        from dynx.model.urdf.other_joint_types import note_swings
+
+        note_swings(limit, what, reading)
         return Limits(**most)
     if kind == "continuous":
         if "lower" in limit.attributes or "upper" in limit.attributes:
