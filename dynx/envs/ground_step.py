@@ -297,11 +297,11 @@ class GroundStep(TaskStep):
         return 0
 
     def robot_text(self, *, stops: bool = False) -> StepText:
-        """Return the text of a step of the robot: from ``state``, ``action``, drawn ``parameters`` and a
-        ``push`` to the next ``state``, in which only the memory of the task is the same. Without `stops` the
-        largest distance ``beyond`` one [rad or m] is another output: where there is none, stops change
-        nothing."""
-        sizes = {"state": self.layout.size, "action": self.actions}
+        """Return the text of a step of the robot: from ``state``, the state at the ``begin`` of the control
+        step, ``action``, drawn ``parameters`` and a ``push`` to the next ``state``, in which only the memory
+        of the task is the same. Without `stops` the largest distance ``beyond`` one [rad or m] is another
+        output: where there is none, stops change nothing."""
+        sizes = {"state": self.layout.size, "begin": self.layout.size, "action": self.actions}
         if self._ground.drawn_parameters:
             sizes["parameters"] = len(self._ground.drawn_parameters)
         if self._ground.pushed:
@@ -321,8 +321,10 @@ class GroundStep(TaskStep):
         motion, varied, contacts = self._motion, self._ground, self._contacts
         state = self.layout.state(inputs["state"])
         drawn = inputs.get("parameters", np.zeros(0))
-        own = motion.own_state(State(*map(traced_array, state)))
-        target = symbol_array(motion.task.targets(own, self._shaped(traced_array(inputs["action"]))))
+        own = motion.own_state(state)
+        # Targets hold during a control step.
+        begin = motion.own_state(self.layout.state(traced_array(inputs["begin"])))
+        target = symbol_array(motion.task.targets(begin, self._shaped(traced_array(inputs["action"]))))
         kept_contacts = motion.contacts(state)
         impulses = kept_contacts.impulses
         joints = varied.joints(self._joints, drawn)
@@ -408,7 +410,8 @@ class GroundLanes(TaskLanes):
         kernels, lanes = [step.robot_kernel, step.kernel], host().lanes
         rows = max(count, lanes)
         sizes = {port.name: port.size for kernel in kernels for port in (*kernel.inputs, *kernel.outputs)}
-        del sizes["moved"]
+        for name in ("moved", "begin"):
+            del sizes[name]
         substeps = step.substeps
         # Two sets of the state in turn, and two that the steps of the robot write in turn.
         states = np.zeros((4, rows, sizes.pop("state")))
@@ -430,7 +433,7 @@ class GroundLanes(TaskLanes):
         edges = np.arange(0, max(rows // CHUNK, 1) + 1) * CHUNK
         edges[-1] = rows
         self._ground, self._states, self._edges = step, states, edges.tolist()
-        self._read, self._written = read, written
+        self._read, self._written, self._begun = read, written, turns.tolist()
         self._chunks = []
         for first, last in pairwise(self._edges):
             part = slice(first, last)
@@ -438,6 +441,7 @@ class GroundLanes(TaskLanes):
             known |= {
                 "state": (states[:, part], np.array(read)),
                 "moved": (states[:, part], np.array(moved)),
+                "begin": (states[:, part], turns),
                 "steps": (steps[:, part], turns),
             }
             outputs = {
@@ -483,10 +487,12 @@ class GroundLanes(TaskLanes):
     def _stop_joints(self, rows: NDArray[np.intp], call: int) -> None:
         """Evaluate a step of the robot again with stops, in lanes in which a joint passes one."""
         kernel = self._ground.kernel_with_stops
-        read, written = self._states[self._read[call]], self._states[self._written[call]]
-        inputs = [
-            read[rows] if port.name == "state" else self.arrays[port.name][rows] for port in kernel.inputs
-        ]
+        written = self._states[self._written[call]]
+        read = self.arrays | {
+            "state": self._states[self._read[call]],
+            "begin": self._states[self._begun[call]],
+        }
+        inputs = [read[port.name][rows] for port in kernel.inputs]
         found = np.empty((len(rows), written.shape[1]))
         kernel(inputs, [found])
         written[rows] = found

@@ -128,6 +128,24 @@ def test_hooks_read_the_forces_of_states() -> None:
     np.testing.assert_allclose(rewards[0, :, 2].mean(), rewards[2, :, 2].mean(), rtol=0.05)
 
 
+class Yielding(Stand):
+    """A stand whose targets follow the velocities at the beginning of a control step."""
+
+    def targets(self, state: GroundState, action: Any) -> Any:
+        return super().targets(state, action) + 0.05 * state.v[6:]
+
+
+def test_targets_are_those_of_the_beginning_of_a_control_step() -> None:
+    """In free flight, where no sweeps end at a tolerance."""
+    found = []
+    for engine in ("dynx", IN_WORLD):
+        with environment(Yielding(contacts="feet"), engine) as env:
+            env.reset(seed=3, options={"disturbance": 5.0})
+            observation = env.step(np.full(12, 0.3, dtype=np.float32))[0]
+            found.append(observation)
+    np.testing.assert_allclose(found[0], found[1], rtol=0.0, atol=1e-5)
+
+
 def test_returns_with_pushes_and_delays_are_those_of_other_engines() -> None:
     """Mean returns of pushed robots differ by less than three standard errors."""
     task, count, steps = Stand(contacts="feet", disturbance=0.5), 8, 40
