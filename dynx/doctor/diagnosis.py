@@ -858,7 +858,8 @@ def _examiners(
             f"engines is {shown(engines)}; wanted names out of {', '.join([*ENGINES, *VARIANTS])}"
         )
     beside = [name for name in COMMON_VARIANTS if engines is None and engine_of(name) in chosen]
-    return Examiner(chosen, samples, seed), Examiner(beside, samples, seed)
+    examiner = Examiner(chosen, samples, seed)
+    return examiner, examiner.of_engines(beside)
 
 
 def _label(robot: object) -> str:

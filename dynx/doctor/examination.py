@@ -42,6 +42,7 @@ from dynx.rules.geometry import (
     texture_replacements,
 )
 from dynx.rules.inertia import has_inertial_data
+from dynx.rules.joints import fresh_name
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_exp, quat_log
 from dynx.workers import Workers
@@ -183,32 +184,75 @@ _FOLDERS_ABOVE = 4
 
 _ABOVE = re.compile(r"(?:\.\./)+")
 
+_URI_OF_FILE = re.compile(r"(?<!http)(?<!https)://")
+"""Part of a URI of a file, unlike the address of a web page in a comment or of a namespace."""
+
 
 @contextmanager
-def temporary_document(source: XmlSource, *, mesh_boxes: bool = False) -> Iterator[Path]:
+def temporary_document(
+    source: XmlSource, *, mesh_boxes: bool = False, folders: DocumentFolders | None = None
+) -> Iterator[Path]:
     """Write the document, with `mesh_boxes` in place of collision meshes, to a file that exists while the
     context lasts.
 
     A document in MJCF or SDF includes files and names meshes by their place relative to its own. Links to
-    these stand beside the file.
+    these stand beside the file. `folders` keeps the links for the next document from the same place.
     """
     form = format_of_root(source.root.tag)
-    with temporary_folder() as folder:
-        if form != "urdf":
-            folder = _linked_folder(folder, Path(source.source), _folders_above(source.text))
-        path = folder / f"robot{_SUFFIXES[form]}"
-        if path.is_symlink():
-            path.unlink()
+    with ExitStack() as stack:
+        if form == "urdf" or folders is None:
+            folder = stack.enter_context(temporary_folder())
+            if form != "urdf":
+                folder = _linked_folder(folder, Path(source.source), _folders_above(source.text))
+        else:
+            folder = folders.of(source)
+        path = _unused_path(folder, _SUFFIXES[form], Path(source.source).name)
+        path.unlink(missing_ok=True)
         written = with_mesh_boxes(source, folder) if mesh_boxes else source
         path.write_bytes(written.to_bytes())
-        yield path
+        try:
+            yield path
+        finally:
+            path.unlink(missing_ok=True)
+
+
+class DocumentFolders:
+    """Temporary folders with links to the files around a document, kept until `close`.
+
+    Links to hundreds of files take longer than most engines. An engine that keeps meshes by their paths, as
+    MuJoCo does, reads each of them once.
+    """
+
+    def __init__(self) -> None:
+        self._kept = ExitStack()
+        self._made: dict[tuple[str, int], Path] = {}
+
+    def of(self, source: XmlSource) -> Path:
+        """Return the folder for a document, which stands for its own folder."""
+        place = source.source, _folders_above(source.text)
+        if place not in self._made:
+            folder = self._kept.enter_context(temporary_folder())
+            self._made[place] = _linked_folder(folder, Path(source.source), place[1])
+        return self._made[place]
+
+    def close(self) -> None:
+        """Remove the folders."""
+        self._made.clear()
+        self._kept.close()
+
+
+def _unused_path(folder: Path, suffix: str, document: str) -> Path:
+    """Return the path ``robot`` with a suffix; with a number where a file other than the document, which it
+    may include, has this name."""
+    taken = {each.stem for each in folder.glob(f"robot*{suffix}") if each.name != document}
+    return folder / f"{fresh_name('robot', taken)}{suffix}"
 
 
 def _folders_above(text: str) -> int:
     """Return the number of folders above a document in which it names files; of its includes and of URIs,
     such as ``model://arm/arm.stl``, it is not known.
     """
-    if "<include" in text or "://" in text:
+    if "<include" in text or _URI_OF_FILE.search(text):
         return _FOLDERS_ABOVE
     return min(max((len(each) // 3 for each in _ABOVE.findall(text)), default=0), _FOLDERS_ABOVE)
 
@@ -735,18 +779,20 @@ class Examiner:
         """Return an examiner with the same engines and seed, and another number of states."""
         return Examiner(self.engines, samples, self.seed, self._positions, self._apart)
 
+    def of_engines(self, names: Collection[str]) -> Examiner:
+        """Return an examiner of the same states with these engines or variants, in the same process."""
+        return Examiner(names, self._samples, self.seed, self._positions, self._apart)
+
     def for_format(self, form: Format) -> Examiner:
         """Return an examiner with those of the engines that load files of a format."""
-        loading = [name for name, kind in self.engines.items() if form in kind.FORMATS]
-        return Examiner(loading, self._samples, self.seed, self._positions, self._apart)
+        return self.of_engines([name for name, kind in self.engines.items() if form in kind.FORMATS])
 
     def for_ball_joints(self) -> Examiner:
         """Return an examiner with those of the engines that take ball joints."""
-        taking = [name for name, kind in self.engines.items() if kind.takes_ball_joints]
-        return Examiner(taking, self._samples, self.seed, self._positions, self._apart)
+        return self.of_engines([name for name, kind in self.engines.items() if kind.takes_ball_joints])
 
     def close(self) -> None:
-        """End the process in which engines load MJCF and SDF."""
+        """End the process in which engines load MJCF and SDF, and remove the folders of these files."""
         self._apart.close()
 
     def at(self, positions: Mapping[str, float]) -> Examiner:
@@ -785,7 +831,9 @@ class Examiner:
         chosen = [name for name in self.engines if engines is None or name in engines]
         with ExitStack() as files:
             paths = {
-                meshes: files.enter_context(temporary_document(text, mesh_boxes=meshes))
+                meshes: files.enter_context(
+                    temporary_document(text, mesh_boxes=meshes, folders=self._apart.folders)
+                )
                 for meshes, text in self._engine_inputs(case, chosen)
             }
             tasks = [
@@ -854,10 +902,12 @@ MAX_ENGINE_TIME = 60.0
 
 
 class EngineProcess:
-    """A process in which engines load files, so that an engine that ends it ends no more than that."""
+    """A process in which engines load files, so that an engine that ends it ends no more than that; and the
+    `folders` of these files."""
 
     def __init__(self) -> None:
         self._workers: Workers | None = None
+        self.folders = DocumentFolders()
 
     def evaluate(self, tasks: Sequence[EngineTask]) -> Iterator[EngineOutput]:
         """Yield the output of each task; an engine that ended the process, or took too long, is not used."""
@@ -873,7 +923,8 @@ class EngineProcess:
                 yield EngineOutput(engine, not_used=f"{engine} {result.failure.message} on this file")
 
     def close(self) -> None:
-        """End the process."""
+        """End the process, and remove the folders."""
+        self.folders.close()
         if self._workers is not None:
             self._workers.close()
             self._workers = None

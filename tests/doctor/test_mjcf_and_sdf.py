@@ -13,7 +13,13 @@ import pytest
 import dynx
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.diagnosis import compare_as_loaded, diagnose, open_case
-from dynx.doctor.examination import EngineProcess, EngineTask, Examiner, temporary_document
+from dynx.doctor.examination import (
+    DocumentFolders,
+    EngineProcess,
+    EngineTask,
+    Examiner,
+    temporary_document,
+)
 from dynx.engines.mujoco.as_loaded import LoadedMujoco
 from dynx.errors import DescriptionError
 from dynx.loaded import installed_engines, load_as
@@ -205,6 +211,53 @@ def test_included_files_are_found_from_the_copy_that_engines_load(tmp_path: Path
     assert report.error is None
     assert report.alike, report.engines
     assert dynx.load(robot).total_mass == report.total_mass
+
+
+def test_a_scene_may_include_a_file_of_the_name_that_the_copy_would_have(tmp_path: Path) -> None:
+    """``scene.xml`` of most robots includes ``robot.xml``."""
+    if "mujoco" not in installed_engines():
+        pytest.skip("needs MuJoCo")
+    (tmp_path / "robot.xml").write_text(
+        '<mujoco model="arm"><worldbody><body name="arm"><joint name="hinge"/><geom size="0.1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    scene = tmp_path / "scene.xml"
+    scene.write_text('<mujoco model="scene"><include file="robot.xml"/></mujoco>')
+    report = compare_as_loaded(scene, engines=["mujoco"], samples=1)
+    assert report.alike, report.engines
+
+
+def test_copies_of_one_document_stand_in_one_folder_until_that_is_closed(tmp_path: Path) -> None:
+    (tmp_path / "arm.stl").write_text("solid arm")
+    document = tmp_path / "robot.xml"
+    document.write_text("<mujoco/>")
+    folders = DocumentFolders()
+    texts = ("<mujoco/>", "<mujoco><worldbody/></mujoco>")
+    for text in texts:
+        with temporary_document(XmlSource(text, str(document)), folders=folders) as path:
+            assert path.read_text() == text
+            assert (path.parent / "arm.stl").read_text() == "solid arm"
+        assert not path.exists()
+        assert path == folders.of(XmlSource(texts[0], str(document))) / "robot.xml"
+    folders.close()
+    assert not path.parent.exists()
+    assert document.read_text() == "<mujoco/>"
+
+
+@pytest.mark.parametrize(
+    ("comment", "levels"), [("https://example.org", 0), ("model://arm/arm.stl", 4), ("../arm.stl", 1)]
+)
+def test_links_stand_for_the_folders_in_which_a_document_may_name_files(
+    comment: str, levels: int, tmp_path: Path
+) -> None:
+    folder = tmp_path / "a" / "b" / "c" / "d"
+    folder.mkdir(parents=True)
+    for above in folder.parents[:4]:
+        (above / "marker").touch()
+    (folder / "arm.sdf").touch()
+    source = XmlSource(f"<sdf><!-- {comment} --></sdf>", str(folder / "arm.sdf"))
+    with temporary_document(source) as path:
+        assert sum((above / "marker").exists() for above in path.parents) == levels
 
 
 def test_meshes_by_uri_are_found_from_the_copy_that_engines_load(tmp_path: Path) -> None:
