@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from functools import lru_cache
+
 import numpy as np
 
 from dynx.errors import ArgumentError
+from dynx.model.elements import Vector
 from dynx.model.geometry.mesh import Mesh
 from dynx.model.geometry.solids import SolidProperties, polyhedron_properties
 from dynx.spatial.scalar import Floats
@@ -17,6 +21,27 @@ def mesh_properties(mesh: Mesh, kind: str) -> SolidProperties:
     stands for the volume, [m^2]), ``legacy`` MuJoCo's sum of tetrahedra, which counts hollows as well. Raises
     ArgumentError for an exact mesh whose surface is not closed, and the errors of `Mesh.hull`.
     """
+    if type(mesh) is Mesh and mesh.fault is None:
+        try:
+            status = os.stat(mesh.file)
+        except (OSError, ValueError):
+            return _properties(mesh, kind)
+        return _of_file(mesh.file, mesh.scale, mesh.part, kind, status.st_mtime_ns, status.st_size)
+    return _properties(mesh, kind)
+
+
+# The doctor reads a robot hundreds of times, each time with one cause fewer and the same meshes.
+@lru_cache(maxsize=1024)
+def _of_file(
+    file: str, scale: Vector, part: int | None, kind: str, changed: int, size: int
+) -> SolidProperties:
+    found = _properties(Mesh(file, scale, part=part), kind)
+    for shared in (found.center, found.inertia):
+        shared.setflags(write=False)
+    return found
+
+
+def _properties(mesh: Mesh, kind: str) -> SolidProperties:
     if kind == "convex":
         return polyhedron_properties(*mesh.hull)
     vertices, faces = mesh.triangles
