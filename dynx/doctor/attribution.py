@@ -309,7 +309,9 @@ class CauseAttributor:
         """Return the change of the engine's output, in the quantity in which it is largest."""
         one, other = with_cause.outputs[engine], without.outputs[engine]
         if other.no_results is not None:
-            return NO_EFFECT
+            # The engine loads the file without the cause, and another cause hides its results.
+            loads = one.refused is not None and other.refused is None
+            return Effect(LOADING, float("inf")) if loads else NO_EFFECT
         if one.no_results is not None:
             return Effect(one.missing, float("inf"))
         largest = NO_EFFECT

@@ -59,6 +59,7 @@ WITHOUT_CAUSE = {
 """,
     "DX709": "link",
     "DX712": "<ixy>0.03125</ixy>",
+    "DX719": "      <pose>0 0 0 0 1e-9 0</pose>\n",
 }
 """What of the trap of each stated omission is its cause."""
 
@@ -102,6 +103,12 @@ def test_a_stated_omission_is_that_of_the_trap(rule: Any) -> None:
     elif rule.id == "DX715":
         start, end = text.index("    <model"), text.rindex("</joint>") + len("</joint>\n")
         text = text[:start] + text[end:]
+    elif rule.id == "DX716":
+        start, end = text.index('    <link name="hand">'), text.rindex("</joint>") + len("</joint>\n")
+        text = text[:start] + text[end:]
+    elif rule.id == "DX718":
+        start, end = text.index("<mesh>"), text.index("</mesh>") + len("</mesh>")
+        text = text[:start] + "<box><size>1 0.5 0.5</size></box>" + text[end:]
     elif rule.id == "DX619":
         text = text.replace(
             '<body name="upper">', '<body name="upper"><joint name="shoulder" axis="0 1 0" type="hinge"/>'
@@ -211,6 +218,20 @@ def test_included_files_are_found_from_the_copy_that_engines_load(tmp_path: Path
     assert report.error is None
     assert report.alike, report.engines
     assert dynx.load(robot).total_mass == report.total_mass
+
+
+@needs_all
+def test_a_refusal_is_a_cause_also_where_another_cause_hides_the_results() -> None:
+    """Drake refuses the script; without the script it loads the file, and lets another link float."""
+    script = "<material><script><name>Gazebo/Red</name></script></material>"
+    visual = f'<visual name="v"><geometry><box><size>1 1 1</size></box></geometry>{script}</visual>'
+    text = trap_case("DX716").source.text.replace("</link>", f"{visual}</link>", 1)
+    spring = "</limit><dynamics><spring_stiffness>5</spring_stiffness></dynamics>"
+    text = text.replace("</limit>", spring, 1)  # which makes no engine fail
+    report = diagnose(text, engines=["drake"], samples=1)
+    effects = {each.rule: each.effect.quantity for each in report.findings if each.effect is not None}
+    assert effects == {"DX714": "loading", "DX716": "result"}
+    assert report.explained
 
 
 def test_a_scene_may_include_a_file_of_the_name_that_the_copy_would_have(tmp_path: Path) -> None:

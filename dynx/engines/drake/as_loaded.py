@@ -530,6 +530,9 @@ class LoadedDrake(LoadedRobot):
             if joint.type_name() == "quaternion_floating"
         }
         floating = free.pop(model.root, None) if model.floating else None
+        if model.floating and floating is None and len(free) == 1 and not wrong:
+            other, root = shown(next(iter(free))), shown(model.root)
+            raise UnusableEngineError(f"drake lets {other} float instead of the root {root} of {model.name}")
         # A joint of six degrees of freedom cannot be held at zero: zero is no attitude.
         wrong |= dict.fromkeys(free, "free")
         if wrong:

@@ -79,6 +79,16 @@ def read_sdf(data: str | bytes, source: str, package_dirs: Iterable[StrPath] = (
     return _RobotReader(top, reading, folders).read()
 
 
+def axes_in_joint_frames(data: str | bytes, source: str) -> list[tuple[str, int, Floats]]:
+    """Return for each axis of a document in SDF its name in the model, the line of its joint, and its
+    direction (3,) of length 1 in the frame of the joint, as the ``<pose>`` of the joint places it.
+
+    A `Joint` has it in the frame of the link that it carries. Raises the errors of `read_sdf`.
+    """
+    found = read_document(data, source, ())
+    return [] if found is None else _RobotReader(*found, ()).axes()
+
+
 @dataclass
 class _Axis:
     """One axis of a joint: its name in the model, and its direction (3,) in the frame of the joint; a ball
@@ -159,6 +169,16 @@ class _RobotReader:
             gravity=gravity,
             base_pose=base_pose,
         )
+
+    def axes(self) -> list[tuple[str, int, Floats]]:
+        """Return what `axes_in_joint_frames` does."""
+        joints = [part for part in self._parts if part.kind == "joint" and _kind(part) in _TYPES]
+        return [
+            (axis.name, joint.element.line, axis.direction)
+            for joint in joints
+            for axis in self._axes(joint)
+            if axis.type != "ball"
+        ]
 
     # -- names ----------------------------------------------------------------------------------
 

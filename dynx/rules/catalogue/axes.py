@@ -12,6 +12,7 @@ import numpy as np
 
 from dynx.errors import escaped, shown
 from dynx.model.document_format import Format
+from dynx.model.sdf.reader import axes_in_joint_frames
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules import (
     EVERY_ENGINE,
@@ -19,6 +20,7 @@ from dynx.rules import (
     Correction,
     Detection,
     EditingRule,
+    Rule,
     correction,
     found_at,
     measured_on,
@@ -259,13 +261,55 @@ class AxisNearlyAligned(EditingRule):
         """Yield the axes of joints that turn about one axis or slide."""
         for place, axis, aligned in _axes(case):
             name, deviation = nearest_axis(axis)
-            if not _NEGLIGIBLE_DEVIATION < deviation < DRAKE_DEVIATION:
+            if not _is_rounded(deviation):
                 continue
             message = f"the axis is {deviation:.2g} rad off {name}"
             engines = ["Drake"] if deviation > PINOCCHIO_DEVIATION else ["Pinocchio", "Drake"]
             clauses = tuple((engine.lower(), f"exactly {name} in {engine}") for engine in engines)
             found = replace(place, message=message, engine_clauses=clauses)
             yield Correction(found, (aligned(AXES[name]),))
+
+
+class TurnedAxisNearlyAligned(Rule):
+    """DX719 turned-axis-nearly-aligned: In the frame of its joint, an axis of SDF differs from a coordinate
+    axis by less than 2e-8 rad; Drake drops this.
+
+    An axis may be stated in another frame than that of the joint: by ``expressed_in`` or
+    ``use_parent_model_frame``, and in files before version 1.5 always in the frame of the model. Rounding of
+    the ``<pose>`` of the joint then turns the axis. For example, the axis ``0 0 1`` of the model is 3e-10 rad
+    off z in the frame of the joint.
+
+    - Drake 1.51.1 uses the coordinate axis, as for an axis with such numbers in the text (DX226).
+    - PyBullet 3.2.7 (``loadSDF``) does not read these frames (DX704).
+
+    The effect: poses and torques are off by up to twice the deviation [rad] at every such joint.
+
+    What to do: write the axis in the frame of the joint. ``dynx doctor --fix`` does not change the file. So
+    the report measures the effect as the difference that remains after all other causes are removed.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    stated = True
+    stated_bound = 1e-6
+    advice = "Write the axis in the frame of the joint."
+    engines = measured_on("drake")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield joints whose axis is near a coordinate axis, unlike the numbers in the text."""
+        written = {place.joint for place, axis, _ in _axes(case) if _is_rounded(nearest_axis(axis)[1])}
+        names = {joint.name for joint in case.model.joints}
+        for joint, line, axis in axes_in_joint_frames(case.source.text_with_lines_before, case.source.source):
+            name, deviation = nearest_axis(axis.tolist())
+            stated = joint.removesuffix("_axis2").removesuffix("_axis")
+            if joint in names and _is_rounded(deviation) and not written & {joint, stated}:
+                message = f"the axis is {deviation:.2g} rad off {name} in the frame of the joint"
+                yield Detection(None, joint, line, message)
+
+
+def _is_rounded(deviation: float) -> bool:
+    """Check whether Drake takes the coordinate axis for an axis that deviates from it."""
+    return _NEGLIGIBLE_DEVIATION < deviation < DRAKE_DEVIATION
 
 
 def _axes(case: Case) -> Iterator[tuple[Detection, Sequence[float], Callable[[str], Edit]]]:

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 from xml.sax.saxutils import escape, quoteattr
 
 from dynx.errors import shown
 from dynx.model.document_format import Format
-from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_above, find_mesh
 from dynx.model.package_search import MODEL_MANIFEST
 from dynx.model.sdf.document import scenery_of
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Remedy, Rule, measured_on
+from dynx.rules.geometry import file_of_mesh, is_found
 from dynx.rules.joints import fresh_name
+
+
+FINITE = sys.float_info.max
+"""Bound of the effect of an omission that changes numbers, and makes no engine refuse the file."""
 
 
 def _parts(case: Case, tag: str) -> Iterator[SourceElement]:
@@ -268,6 +274,7 @@ class SpringOfSdf(Rule):
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
     trap_base = "floating"
     stated = True
+    stated_bound = FINITE
     advice = "Decide whether torques include springs, and configure each engine accordingly."
     engines = measured_on("drake")
 
@@ -350,9 +357,9 @@ class SeveralRootsOfSdf(Rule):
     """DX709 several-roots-of-sdf: Several links of a model have no joint to a parent, and PyBullet crashes.
 
     A static model of SDF may have links that no joint connects. All links of a static model are fixed to the
-    world.
+    world. In a model that moves, a link may be the child of several joints (DX716).
 
-    - Drake 1.51 fixes each of these links to its world.
+    - Drake 1.51 fixes each of these links of a static model to its world.
     - PyBullet 3.2.7 (``loadSDF``) prints "URDF file with multiple root links found", and then the process
       ends with a segmentation fault.
 
@@ -524,6 +531,7 @@ class ProductsOfInertiaOfSdf(Rule):
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
     trap_base = "floating"
     stated = True
+    stated_bound = FINITE
     advice = "Rotate the frame of the inertial into the principal axes, or convert the file to URDF."
     engines = measured_on("pybullet")
 
@@ -706,3 +714,108 @@ class NestedModelOfSdf(Rule):
             if nested and not _is_state(element):
                 name = shown(element.attributes.get("name", ""))
                 yield Detection(None, None, element.line, f"the model contains the model {name}")
+
+
+class OtherFloatingLinkOfSdf(Rule):
+    """DX716 other-floating-link-of-sdf: Several links are the child of no joint, and Drake lets another of
+    them float than dynx.
+
+    A link may be the child of several joints. For example, ``left_finger`` and ``right_finger`` are both
+    parents of ``palm``. Such a model is a tree, in which some joints lead from the child to the parent.
+
+    - Drake 1.51 reads these joints backwards, as dynx does. One of the links without a parent floats. It need
+      not be the first of them, which is the root in dynx. Then the coordinates of the base are those of
+      another link, and the doctor does not use Drake.
+    - PyBullet 3.2.7 (``loadSDF``) crashes (DX709).
+
+    What to do: exchange parent and child of the joints that lead to the link, and negate their axes. Or write
+    such a file by ``dynx convert --to sdf``. ``dynx doctor --fix`` does not change the file.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    stated = True
+    advice = "Write joints that lead away from one link (dynx convert --to sdf)."
+    engines = measured_on("drake")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the second root of each model that floats."""
+        for model in case.source.root.walk():
+            static = model.first("static")
+            if model.tag != "model" or _is_state(model) or (static is not None and _is_true(case, static)):
+                continue
+            ends = {
+                tag: {case.source.text_in(each) for joint in model.all("joint") for each in joint.all(tag)}
+                for tag in ("parent", "child")
+            }
+            roots = [
+                each
+                for each in model.all("link")
+                if each.attributes.get("name") in ends["parent"] - ends["child"]
+            ]
+            for link in () if "world" in ends["parent"] else roots[1:2]:
+                yield _found(link, link, f"the model has {len(roots)} links that are only parents of joints")
+
+
+class PartsOfStateOfSdf(EditingRule):
+    """DX717 parts-of-state-of-sdf: The state of a world has models or lights, so Drake refuses the file.
+
+    Gazebo saves a world with ``<state>``, which has the pose and the velocity of each model at that time.
+
+    - Drake 1.51 refuses the file: "XML Element[model], child of element[state], not defined in SDF".
+    - PyBullet 3.2.7 (``loadSDF``) and dynx ignore the element. Each model has the pose that it states itself.
+
+    What to do: remove the models and lights from ``<state>``, as ``dynx doctor --fix`` does. Gazebo then
+    starts at the poses of the models.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    advice = "Remove models and lights from <state>."
+    engines = measured_on("drake")
+    changed = "removed models and lights from the state of the world, so that Gazebo starts at their poses"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the models and lights of states, in document order."""
+        for element in case.source.root.walk():
+            around = element.parent
+            if element.tag in ("model", "light") and around is not None and around.tag == "state":
+                name = shown(element.attributes.get("name", ""))
+                message = f"the state has the {element.tag} {name}"
+                place = Detection(None, None, element.line, message)
+                yield Correction(place, (case.source.removal(element),))
+
+
+class MeshInOtherFolder(Rule):
+    """DX718 mesh-in-other-folder: PyBullet does not find the mesh of a collision, and refuses the file.
+
+    ``model://arm/arm.stl`` is the file ``arm.stl`` of the model ``arm``. Gazebo searches for the model in
+    ``GZ_SIM_RESOURCE_PATH``. dynx also searches in ``package_dirs`` and near the file: for a folder with this
+    name, and for a folder whose ``model.config`` has this name.
+
+    - PyBullet 3.2.7 (``loadSDF``) ignores ``model://``. It searches for ``arm/arm.stl`` in the folder of the
+      file and in the folders above it. If the mesh is not there, PyBullet refuses the file: "Could not parse
+      collision element".
+    - Drake 1.51 reads the dynamics without the mesh.
+
+    A mesh that only draws does not matter.
+
+    What to do: start PyBullet in a folder that contains the folder of the model. Or convert the file to URDF
+    (``dynx convert --to urdf``). ``dynx doctor --fix`` does not change the file.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    stated = True
+    stated_refusal = True
+    advice = "Start PyBullet in a folder that contains the folder of the model, or convert the file to URDF."
+    engines = measured_on("pybullet")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the meshes of collisions that dynx finds and PyBullet does not."""
+        for link in _parts(case, "link"):
+            for shape in link.all("collision"):
+                for mesh in (each for each in shape.walk() if each.tag == "mesh"):
+                    file, source = file_of_mesh(case.source, mesh), case.source.source
+                    if is_found(file, source) and find_above(file, source) is None:
+                        yield _found(link, mesh, f"PyBullet does not find {shown(file, 200)}")
