@@ -18,7 +18,6 @@ from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Re
 from dynx.rules.geometry import file_of_mesh, is_found
 from dynx.rules.joints import fresh_name
 
-
 FINITE = sys.float_info.max
 """Bound of the effect of an omission that changes numbers, and makes no engine refuse the file."""
 
