@@ -769,6 +769,8 @@ def _stated_effects(
             quantity = max(errors, key=lambda name: errors[name], default=None)
             if output.refused is not None and not rule.stated_refusal:
                 continue
+            if output.no_results is not None and rule.stated_numbers:
+                continue
             if output.no_results is not None:
                 effect = Effect(output.missing, float("inf"))
             elif quantity is not None and errors[quantity] > tolerance:

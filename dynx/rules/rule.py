@@ -138,6 +138,9 @@ class Rule(ABC):
     stated_bound: ClassVar[float] = float("inf")
     """Largest error that a `stated` cause accounts for."""
 
+    stated_numbers: ClassVar[bool] = False
+    """True if engines compute results in spite of a `stated` cause: it is never the reason for none."""
+
     undefined: ClassVar[str] = ""
     """Name of what the file leaves undefined where the cause is present, such as ``dynamics``; mostly empty.
     It is the effect of the cause in every engine, and needs no measurement."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 from xml.sax.saxutils import escape, quoteattr
@@ -17,9 +16,6 @@ from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Remedy, Rule, measured_on
 from dynx.rules.geometry import file_of_mesh, is_found
 from dynx.rules.joints import fresh_name
-
-FINITE = sys.float_info.max
-"""Bound of the effect of an omission that changes numbers, and makes no engine refuse the file."""
 
 
 def _parts(case: Case, tag: str) -> Iterator[SourceElement]:
@@ -273,7 +269,7 @@ class SpringOfSdf(Rule):
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
     trap_base = "floating"
     stated = True
-    stated_bound = FINITE
+    stated_numbers = True
     advice = "Decide whether torques include springs, and configure each engine accordingly."
     engines = measured_on("drake")
 
@@ -530,7 +526,7 @@ class ProductsOfInertiaOfSdf(Rule):
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
     trap_base = "floating"
     stated = True
-    stated_bound = FINITE
+    stated_numbers = True
     advice = "Rotate the frame of the inertial into the principal axes, or convert the file to URDF."
     engines = measured_on("pybullet")
 
