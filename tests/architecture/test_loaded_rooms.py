@@ -97,7 +97,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         104,
-        19030,
+        19300,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
