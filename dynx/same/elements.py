@@ -452,6 +452,7 @@ def _added_joints(model: Model) -> Iterator[str]:
 
 def _of_joints(found: Fit, tolerance: float) -> Iterator[DifferingElement]:
     frames = {each.theirs: each for each in found.bodies}
+    matched = {found.ours.joints[each.ours].name for each in found.bodies if each.ours != ROOT}
     length = found.ours.reach
     for each in found.bodies:
         if each.ours == ROOT:
@@ -463,6 +464,10 @@ def _of_joints(found: Fit, tolerance: float) -> Iterator[DifferingElement]:
             yield _origin(found, each, parent)
         if each.axis > tolerance:
             yield _axis(found, each)
+        mimic = found.ours.joints[each.ours].mimic
+        if mimic is not None and mimic.joint not in matched:
+            # That joint is named as one without a counterpart.
+            continue
         if each.scale > tolerance * _unit_scale(found, each) or each.offset > tolerance * (
             1.0 if found.ours.kinds[each.ours] == "revolute" else length
         ):

@@ -4,6 +4,7 @@ orders, and no position that is compared with one of another type."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -115,3 +116,29 @@ def test_a_ball_joint_has_no_lower_limit() -> None:
         report = same_robot(ONE.text(), text)
         limits = [each for each in report.attributes if each.kind.endswith("limit")]
         assert [(each.kind, each.first) for each in limits] == rows
+
+
+def test_a_joint_that_follows_one_without_a_counterpart_is_compared(tmp_path: Path) -> None:
+    """The driver `lift` hangs on another link in each robot; `turn` follows it in both."""
+    inertial = (
+        '<inertial><mass value="1"/><origin xyz="0.1 0.2 0.3"/>'
+        '<inertia ixx="1" iyy="1.2" izz="1.4" ixy="0.1" ixz="0.2" iyz="0.3"/></inertial>'
+    )
+    texts = []
+    for parent in ("base", "tip"):
+        links = "".join(f'<link name="{name}">{inertial}</link>' for name in ("base", "arm", "tip", "cage"))
+        joints = "".join(
+            f'<joint name="{name}" type="{kind}"><parent link="{above}"/><child link="{child}"/>'
+            f'<origin xyz="0.3 0.1 0.2"/><axis xyz="{axis}"/>{more}'
+            '<limit lower="-1" upper="1" effort="9" velocity="9"/></joint>'
+            for name, kind, above, child, axis, more in (
+                ("swing", "revolute", "base", "arm", "0 1 0", ""),
+                ("turn", "revolute", "arm", "tip", "1 0 0", '<mimic joint="lift" multiplier="2"/>'),
+                ("lift", "prismatic", parent, "cage", "0 0 1", ""),
+            )
+        )
+        texts.append(tmp_path / f"{parent}.urdf")
+        texts[-1].write_text(f'<robot name="r">{links}{joints}</robot>')
+    report = same_robot(*texts)
+    assert not report.same
+    assert [each.theirs for each in report.unmatched] == ["lift"]
