@@ -6,7 +6,18 @@ the block for given others and changes u. Entries of u that no other block has a
 product with the block's own impulses. So a visit takes operations for the joints that two blocks have in
 common, and rows of many blocks take far fewer than the Delassus matrix of all.
 
-The laws are those of `dynx.rbd.constraints`. A joint with dry friction r and stops may have the velocities
+The laws are those of `dynx.rbd.constraints`. Without its own impulses a contact has the velocity f, with them
+w = f + G x. It sticks where x = -G^-1 f is in the cone. Where it slides, its impulses are x = n (1, mu d) with
+a direction d of length 1, and w_n = 0 gives n = -f_n / (a + mu b . d), for the entries a of the normal, b
+beside it and T of the tangents in G. What is left is that d is opposite to w_t, that is to
+
+    p(d) = (a + mu b . d) f_t - f_n (b + mu T d),
+
+which is affine in d. A visit takes one step of Newton's method for the angle of d: d + t e with e normal to d,
+where t = -e . p / (e . p' e - d . p), is parallel to (e . p' e) d - p. Where that is shorter than e . p' e, it
+is not made longer, so that a visit changes nothing but where the laws are violated.
+
+A joint with dry friction r and stops may have the velocities
 low <= w <= high in the step, where low <= 0 <= high. Its impulse is at most r against the motion between
 them, and any at a stop that exceeds r against it. That is a maximal monotone graph, of which a visit finds
 the one point on the line w = z + g x.
@@ -20,17 +31,36 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.rbd.constraints import TINY, disk_share, largest_eigenvalue, norm
+from dynx.rbd.constraints import TINY, disk_share, inverse_length, largest_eigenvalue, norm
 from dynx.rbd.eliminated_rows import EliminatedRows
-from dynx.spatial.scalar import Array, less, maximum, minimum, select
-
-INNER = 2
-"""Solutions of normal and tangents one after the other in a visit of a contact. Two of them in a visit
-reduce the residual as much as two visits, because the rows of a point are coupled more than two points."""
+from dynx.spatial.scalar import Array, less, less_equal, maximum, minimum, select
 
 IMMOVABLE = 1e-9
 """Inverse of an effective mass [1/kg or 1/(kg m^2)] up to which an impulse moves nothing, and is none. The
 tip of a fixed arm that cannot move along the normal of the ground has such a row."""
+
+SINGULAR = 1e-6
+"""Inverse of a normal's effective mass while its tangents stick, relative to that of one without friction, up
+to which it counts as none."""
+
+LEAST_SHARE = 0.1
+"""Least effective mass of a contact that slides, relative to that of one without friction, by which a visit
+divides. The mass is smaller, or negative, where friction presses a contact to the ground until it jams."""
+
+INFINITE = 1e300
+"""Inverse of an effective mass by which no impulse changes."""
+
+PROXIMAL = 1e-8
+"""Part of the scales that a visit adds to the diagonal of a contact's block of the Delassus matrix, together
+with a velocity that balances it at the impulses before the visit. A fixed point is the same. Tangents may
+depend on each other, as those of a robot that moves in a plane, and the sum is regular."""
+
+PROXIMAL_OF_REDUNDANT = 0.3
+"""The same part for several points of a body. Steps of their visits that are exact for given others lead
+around a solution in cycles where points stick and slide in turn."""
+
+LEAST_IMPULSE = 1e-20
+"""Largest friction [N s] of a contact before a visit that counts as none."""
 
 Vector = list[Any]
 Velocities = dict[int, Any]
@@ -61,16 +91,30 @@ class Block:
     """1 / D of these entries. A product Y D^-1 for each row would take as much memory as Y."""
     own: list[Vector]
     """Part of the block of the Delassus matrix from entries that no other block has."""
+    removed: list[Vector]
+    """`own` - `G`."""
     G: list[Vector]
-    """Block of the Delassus matrix."""
+    """Block of the Delassus matrix, with the proximal term on the diagonal of a contact."""
     scales: Vector
     """Largest eigenvalue of G for the normal and for the tangents, or of a joint's row."""
     inverse: Vector
     """1 / scales; 0 where nothing can move."""
+    sticking: list[Vector]
+    """-`G`^-1 of a contact; 0 where its normal depends on its tangents."""
+    least_curvature: Any
+    """Least e . p' e of a contact that slides, divided by -f_n mu."""
+    least_slope: Any
+    """Least effective mass by which a visit of a contact that slides divides; `INFINITE` where the normal
+    cannot move."""
 
 
-def blocks_of(eliminated: EliminatedRows, pivots: Sequence[Any], contacts: int, joints: int) -> list[Block]:
-    """Return the blocks of rows: 3 for each contact, then one for each joint. `pivots` are 1 / D."""
+def blocks_of(
+    eliminated: EliminatedRows, pivots: Sequence[Any], contacts: int, joints: int, *, redundant: bool
+) -> list[Block]:
+    """Return the blocks of rows: 3 for each contact, then one for each joint.
+
+    `pivots` are 1 / D. Contacts are `redundant` where a body has several.
+    """
     rows = [[3 * k, 3 * k + 1, 3 * k + 2] for k in range(contacts)]
     rows += [[3 * contacts + k] for k in range(joints)]
     count: dict[int, int] = {}
@@ -78,10 +122,13 @@ def blocks_of(eliminated: EliminatedRows, pivots: Sequence[Any], contacts: int, 
         for place in {place for row in each for place in eliminated.Y[row]}:
             count[place] = count.get(place, 0) + 1
     shared = {place for place, n in count.items() if n > 1}
-    return [_block(eliminated, pivots, each, shared) for each in rows]
+    proximal = PROXIMAL_OF_REDUNDANT if redundant else PROXIMAL
+    return [_block(eliminated, pivots, each, shared, proximal) for each in rows]
 
 
-def _block(eliminated: EliminatedRows, pivots: Sequence[Any], rows: list[int], shared: set[int]) -> Block:
+def _block(
+    eliminated: EliminatedRows, pivots: Sequence[Any], rows: list[int], shared: set[int], proximal: float
+) -> Block:
     def shared_part(row: Velocities) -> Velocities:
         return {place: entry for place, entry in row.items() if place in shared}
 
@@ -104,10 +151,50 @@ def _block(eliminated: EliminatedRows, pivots: Sequence[Any], rows: list[int], s
     if len(rows) == 3:
         scales.append(largest_eigenvalue(G[1][1], G[2][2], G[1][2]))
     inverse = [select(less(IMMOVABLE, each), 1.0 / (each + TINY), 0.0) for each in scales]
+    sticking: list[Vector] = []
+    moves: Any = 1.0
+    if len(rows) == 3:
+        for k, scale in enumerate((scales[0], scales[1], scales[1])):
+            G[k][k] = G[k][k] + proximal * scale
+        sticking, moves = _sticking(G)
+    removed = [[a - b for a, b in zip(*each, strict=True)] for each in zip(own, G, strict=True)]
+    least_curvature = select(moves, 0.0, scales[-1])
+    least_slope = select(less(IMMOVABLE, scales[0]), LEAST_SHARE * scales[0], INFINITE)
     Y = [shared_part(eliminated.Y[row]) for row in rows]
     places = {place for row in Y for place in row}
     support = {place for row in rows for place in eliminated.Y[row]}
-    return Block(rows, support, Y, {place: pivots[place] for place in places}, own, G, scales, inverse)
+    pivots_of_places = {place: pivots[place] for place in places}
+    return Block(
+        rows,
+        support,
+        Y,
+        pivots_of_places,
+        own,
+        removed,
+        G,
+        scales,
+        inverse,
+        sticking,
+        least_curvature,
+        least_slope,
+    )
+
+
+def _sticking(G: list[Vector]) -> tuple[list[Vector], Any]:
+    """Return -G^-1 of a contact, and whether its normal moves while its tangents stick.
+
+    Where it does not, a contact that closes a gap cannot stick, and the matrix is 0.
+    """
+    (a, b, c), (_, d, e), (_, _, f) = G
+    share = 1.0 / (d * f - e * e + TINY)
+    ss, st, tt = share * f, share * e, share * d
+    s, t = ss * b - st * c, tt * c - st * b
+    schur = a - b * s - c * t
+    moves = less(maximum(SINGULAR * a, IMMOVABLE), schur)
+    n = select(moves, 1.0 / (schur + TINY), 0.0)
+    ns, nt, kept = n * s, n * t, select(moves, 1.0, 0.0)
+    st = kept * st - ns * t
+    return [[-n, ns, nt], [ns, -kept * ss - ns * s, st], [nt, st, -kept * tt - nt * t]], moves
 
 
 def impulse_velocities(blocks: Sequence[Block], x: Vector) -> Velocities:
@@ -128,11 +215,11 @@ def _add(u: Velocities, block: Block, steps: Sequence[Any]) -> None:
         u[place] = u.get(place, 0.0) + block.pivots[place] * each
 
 
-def block_velocity(block: Block, c: Vector, u: Velocities, x: Vector) -> Vector:
+def block_velocity(block: Block, c: Vector, u: Velocities, x: Vector, *, free: bool = False) -> Vector:
     """Return the velocities of a block's rows, for impulses x (m,) and the entries of u that belong to
-    them."""
+    them; if `free`, without the impulses of the block."""
     found = []
-    for row, entries, own in zip(block.rows, block.Y, block.own, strict=True):
+    for row, entries, own in zip(block.rows, block.Y, block.removed if free else block.own, strict=True):
         # Two sums, of which each waits for half of the additions.
         first, second = c[row], 0.0
         for other, entry in zip(block.rows, own, strict=True):
@@ -165,16 +252,19 @@ def block_sweep(
         done: list[Vector] = []
         for number in group:
             block = blocks[number]
-            w = block_velocity(block, c, u, x)
+            f = block_velocity(block, c, u, x, free=True)
             held = [x[row] for row in block.rows]
             if len(held) == 3:
-                new = _contact_impulses(block, friction[number], held, w)
+                new = _contact_impulses(block, friction[number], held, f)
             else:
-                new = [_joint_impulse(block, bounds[number - len(friction)], held[0], w[0])]
-            done.append([a - b for a, b in zip(new, held, strict=True)])
-            for place, (row, step) in enumerate(zip(block.rows, done[-1], strict=True)):
-                x[row] = new[place]
-                change = maximum(change, abs(step) * block.scales[min(place, 1)])
+                new = [_joint_impulse(block, bounds[number - len(friction)], f[0])]
+            steps = [a - b for a, b in zip(new, held, strict=True)]
+            for row, impulse in zip(block.rows, new, strict=True):
+                x[row] = impulse
+            change = maximum(change, abs(steps[0]) * block.scales[0])
+            if len(steps) == 3:
+                change = maximum(change, maximum(abs(steps[1]), abs(steps[2])) * block.scales[1])
+            done.append(steps)
         for number, steps in zip(group, done, strict=True):
             _add(u, blocks[number], steps)
     return u, x, change
@@ -203,33 +293,39 @@ def visits(blocks: Sequence[Block]) -> list[tuple[int, ...]]:
     return found
 
 
-def _contact_impulses(block: Block, mu: Any, x: Vector, w: Vector) -> Vector:
-    """Return the impulses of a contact for given others, after `INNER` solutions of its normal and its
-    tangents."""
-    (a, b, c), (_, d, e), (_, _, f) = block.G
-    of_normal, of_tangents = block.inverse
+def _contact_impulses(block: Block, mu: Any, x: Vector, f: Vector) -> Vector:
+    """Return the impulses of a contact for given others, from impulses x (3,) near them and its velocities f
+    (3,) without them."""
+    (a, b, c), (_, d, e), (_, _, g) = block.G
     n, s, t = x
-    wn, ws, wt = w
-    for number in range(INNER):
-        last = number == INNER - 1
-        new = maximum(0.0, n - wn * of_normal)
-        step, n = new - n, new
-        ws, wt = ws + b * step, wt + c * step
-        ys, yt = s - ws * of_tangents, t - wt * of_tangents
-        share = disk_share(mu * n, [ys, yt])
-        ds, dt = share * ys - s, share * yt - t
-        s, t = share * ys, share * yt
-        if not last:
-            wn = wn + a * step + b * ds + c * dt
-            ws, wt = ws + d * ds + e * dt, wt + e * ds + f * dt
-    return [n, s, t]
+    fn, fs, ft = f
+    stuck = [row[0] * fn + row[1] * fs + row[2] * ft for row in block.sticking]
+    most = mu * stuck[0]
+    sticks = less_equal(maximum(stuck[1] * stuck[1] + stuck[2] * stuck[2] - most * abs(most), fn), 0.0)
+    # B is the matrix of p; the first direction is that of the impulses before.
+    mu_n, mu_s, mu_t = mu * fn, mu * fs, mu * ft
+    B = [[mu_s * b - mu_n * d, mu_s * c - mu_n * e], [mu_t * b - mu_n * e, mu_t * c - mu_n * g]]
+    shortened = 1.0 / maximum(mu * n, LEAST_IMPULSE)
+    ds, dt = shortened * s, shortened * t
+    ps = a * fs - fn * b + B[0][0] * ds + B[0][1] * dt
+    pt = a * ft - fn * c + B[1][0] * ds + B[1][1] * dt
+    curvature = (B[0][0] * dt - (B[0][1] + B[1][0]) * ds) * dt + B[1][1] * (ds * ds)
+    curvature = maximum(curvature, -mu_n * block.least_curvature)
+    wanted = [curvature * ds - ps, curvature * dt - pt]
+    length = inverse_length(curvature, wanted)
+    ds, dt = length * wanted[0], length * wanted[1]
+    slope = a + mu * (b * ds + c * dt)
+    # An immovable normal keeps its impulse, which is none.
+    divisor = maximum(slope, block.least_slope)
+    slides = maximum(0.0, (n * (divisor - slope) - fn) / divisor)
+    limit = mu * slides
+    found = [slides, limit * ds, limit * dt]
+    return [select(sticks, one, other) for one, other in zip(stuck, found, strict=True)]
 
 
-def _joint_impulse(block: Block, bounds: JointBounds, x: Any, w: Any) -> Any:
-    """Return the impulse of a joint for given others."""
-    g = block.scales[0]
-    free = w - g * x
-    held = _end_velocity(bounds, g, free)
+def _joint_impulse(block: Block, bounds: JointBounds, free: Any) -> Any:
+    """Return the impulse of a joint for given others, which without it has the velocity `free`."""
+    held = _end_velocity(bounds, block.scales[0], free)
     return (held - free) * block.inverse[0]
 
 

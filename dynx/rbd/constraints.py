@@ -266,6 +266,12 @@ def disk_share(radius: Any, wanted: Sequence[Any]) -> Any:
     return minimum(1.0, radius / _root(x * x + y * y + TINY))
 
 
+def inverse_length(least: Any, vector: Sequence[Any]) -> Any:
+    """Return 1 / length of a vector of two components, or 1 / `least` where that is longer, for any scalar."""
+    x, y = vector
+    return 1.0 / _root(maximum(least * least, x * x + y * y) + TINY)
+
+
 def norm(vector: Sequence[Any]) -> Any:
     """Return the length of a vector of one or two components, for any scalar."""
     if len(vector) == 1:

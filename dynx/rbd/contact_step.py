@@ -269,9 +269,10 @@ def contact_step(
     opening = [opening_velocity(gap, h) for gap in gaps]
     for k, each in enumerate(opening):
         c[3 * k] = c[3 * k] + each
+    redundant = touching.has_redundant_points(mechanism)
     if sweeps.accelerated is None:
-        sweeps = replace(sweeps, accelerated=touching.has_redundant_points(mechanism))
-    blocks = blocks_of(eliminated, pivots, contacts, len(limited))
+        sweeps = replace(sweeps, accelerated=redundant)
+    blocks = blocks_of(eliminated, pivots, contacts, len(limited), redundant=redundant)
     bounds = [_bounds(joints, k, positions[k], h) for k in limited]
     solved, w = _solved_impulses(blocks, sweeps, c, touching.friction, bounds, impulses, repeat)
     for k, each in enumerate(opening):
