@@ -7,15 +7,17 @@ product with the block's own impulses. So a visit takes operations for the joint
 common, and rows of many blocks take far fewer than the Delassus matrix of all.
 
 The laws are those of `dynx.rbd.constraints`. Without its own impulses a contact has the velocity f, with them
-w = f + G x. It sticks where x = -G^-1 f is in the cone. Where it slides, its impulses are x = n (1, mu d) with
-a direction d of length 1, and w_n = 0 gives n = -f_n / (a + mu b . d), for the entries a of the normal, b
-beside it and T of the tangents in G. What is left is that d is opposite to w_t, that is to
+w = f + G x. It sticks where x = -G^-1 f is in the cone. Where it slides, its impulses are x = n (1, mu d)
+with a direction d of length 1. Of G, a is the entry of the normal, b are those beside it, and T is the block
+of the tangents. From w_n = 0 follows n = -f_n / (a + mu b . d). The direction d is opposite to w_t, that is
+to
 
     p(d) = (a + mu b . d) f_t - f_n (b + mu T d),
 
-which is affine in d. A visit takes one step of Newton's method for the angle of d: d + t e with e normal to d,
-where t = -e . p / (e . p' e - d . p), is parallel to (e . p' e) d - p. Where that is shorter than e . p' e, it
-is not made longer, so that a visit changes nothing but where the laws are violated.
+which is affine in d. A visit takes one step of Newton's method for the angle of d: d + t e with e normal to
+d and t = -(e . p) / (e . p' e - d . p), which is parallel to (e . p' e) d - p. Where that vector is shorter
+than e . p' e, the visit divides it by e . p' e, not by its length. So a visit changes nothing where the laws
+are obeyed, and only there.
 
 A joint with dry friction r and stops may have the velocities
 low <= w <= high in the step, where low <= 0 <= high. Its impulse is at most r against the motion between
@@ -31,7 +33,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.rbd.constraints import TINY, disk_share, inverse_length, largest_eigenvalue, norm
+from dynx.rbd.constraints import TINY, disk_share, inverse_length, largest_eigenvalue, norm, root
 from dynx.rbd.eliminated_rows import EliminatedRows
 from dynx.spatial.scalar import Array, less, less_equal, maximum, minimum, select
 
@@ -346,6 +348,8 @@ def block_residual(
 ) -> tuple[Any, list[Vector]]:
     """Return the largest violation of the laws [m/s or rad/s], and the velocities of each block's rows."""
     worst: Any = 0.0
+    # Squared, so that one root is that of all contacts.
+    friction_error: Any = 0.0
     velocities = []
     for number, block in enumerate(blocks):
         w = block_velocity(block, c, u, x)
@@ -360,15 +364,11 @@ def block_residual(
         radius = friction[number] * maximum(held[0], 0.0)
         wanted = [y - v * block.inverse[1] for y, v in zip(held[1:], w[1:], strict=True)]
         share = disk_share(radius, wanted)
-        missed = [y - share * z for y, z in zip(held[1:], wanted, strict=True)]
-        for each in (
-            -w[0],
-            abs(minimum(w[0], g_n * held[0])),
-            g_t * norm(missed),
-            g_t * (norm(held[1:]) - radius),
-        ):
+        s, t = (g_t * (y - share * z) for y, z in zip(held[1:], wanted, strict=True))
+        friction_error = maximum(friction_error, s * s + t * t)
+        for each in (-w[0], abs(minimum(w[0], g_n * held[0])), g_t * (norm(held[1:]) - radius)):
             worst = maximum(worst, each)
-    return worst, velocities
+    return maximum(worst, root(friction_error)), velocities
 
 
 # -- displacements ------------------------------------------------------------------------------------

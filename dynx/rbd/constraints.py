@@ -179,7 +179,7 @@ def largest_eigenvalue(a: Any, b: Any, c: Any) -> Any:
     """Return the largest eigenvalue of the symmetric matrix with the diagonal a, b and the entry c, for any
     scalar."""
     half = 0.5 * (a - b)
-    return 0.5 * (a + b) + _root(half * half + c * c)
+    return 0.5 * (a + b) + root(half * half + c * c)
 
 
 def sweep(
@@ -263,23 +263,25 @@ def disk_share(radius: Any, wanted: Sequence[Any]) -> Any:
     if len(wanted) == 1:
         return minimum(1.0, radius / (abs(wanted[0]) + TINY))
     x, y = wanted
-    return minimum(1.0, radius / _root(x * x + y * y + TINY))
+    return minimum(1.0, radius / root(x * x + y * y + TINY))
 
 
 def inverse_length(least: Any, vector: Sequence[Any]) -> Any:
-    """Return 1 / length of a vector of two components, or 1 / `least` where that is longer, for any scalar."""
+    """Return 1 / the length of a vector of two components, or 1 / `least` where that is longer, for any
+    scalar."""
     x, y = vector
-    return 1.0 / _root(maximum(least * least, x * x + y * y) + TINY)
+    return 1.0 / root(maximum(least * least, x * x + y * y) + TINY)
 
 
 def norm(vector: Sequence[Any]) -> Any:
     """Return the length of a vector of one or two components, for any scalar."""
     if len(vector) == 1:
         return abs(vector[0])
-    return _root(vector[0] * vector[0] + vector[1] * vector[1])
+    return root(vector[0] * vector[0] + vector[1] * vector[1])
 
 
-def _root(x: Any) -> Any:
+def root(x: Any) -> Any:
+    """Return the square root of a number, for any scalar."""
     # NumPy takes ten times as long for a float.
     return math.sqrt(x) if isinstance(x, float) else sqrt(x)[()]
 

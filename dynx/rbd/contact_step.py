@@ -69,6 +69,12 @@ MAX_GROWTH = 2.0
 friction stick beside contacts, impulses grow by equal steps until one of them slips, and acceleration takes
 many of these steps at once. Where steps grow faster, the sweeps alone go on."""
 
+RATIO = 0.1
+"""Change of a sweep relative to that of the sweep before, at which `Sweeps.tolerance` is the bound."""
+
+LEAST_RATIO = 0.02
+"""Least such ratio that sweeps without acceleration rely on."""
+
 DISPLACEMENT_SWEEPS = 4
 """Number of sweeps for the displacement between two tests."""
 
@@ -176,7 +182,9 @@ class Sweeps:
 
     tolerance: float = 2e-6
     """Change of a row's velocity in a sweep below which they end [m/s]: residuals are then below half of it
-    where contacts bear a robot on separate feet."""
+    where contacts bear a robot on separate feet. It is the bound of sweeps whose changes fall tenfold; of
+    those that fall faster or slower it is higher or lower, so that the next change would be the same. With
+    acceleration, of which the next change tells little, it is always the bound."""
     most: int = 60
     """Largest number of sweeps."""
     accelerated: bool | None = None
@@ -402,8 +410,9 @@ def _solved_impulses(
             blocks, c, friction, bounds, dict(zip(places, of_point, strict=True)), point
         )
         shared = [u[k] for k in places]
-        found = {"impulses": x, "shared": shared, "goes_on": [less(sweeps.tolerance, change)]}
+        found = {"impulses": x, "shared": shared}
         if accelerated:
+            found["goes_on"] = [less(sweeps.tolerance, change)]
             step = [a - b for a, b in zip(x, point, strict=True)]
             size = _product(weights, step, step)
             turned = [a - b for a, b in zip(step, state["step"], strict=True)]
@@ -413,12 +422,19 @@ def _solved_impulses(
             found |= {"step": step, "size": [size]}
             found["point"] = [a - share * (a - b) for a, b in zip(x, state["impulses"], strict=True)]
             found["of_point"] = [a - share * (a - b) for a, b in zip(shared, state["shared"], strict=True)]
+        else:
+            # The next change times the one before, from the ratio of both.
+            before = state["change"][0]
+            expected = maximum(change, LEAST_RATIO * before) * change
+            found |= {"change": [change], "goes_on": [less((RATIO * sweeps.tolerance) * before, expected)]}
         return {name: as_objects(values) for name, values in found.items()}
 
     x, shared = list(impulses), [start[k] for k in places]
     first = {"impulses": x, "shared": shared, "goes_on": [1.0]}
     if accelerated:
         first |= {"point": x, "of_point": shared, "step": [0.0] * len(x), "size": [0.0]}
+    else:
+        first["change"] = [sweeps.tolerance / RATIO]
     state = repeat(next_state, {name: as_objects(values) for name, values in first.items()}, sweeps.most)
     u: Velocities = dict(zip(places, state["shared"], strict=True))
     residual, w = block_residual(blocks, c, friction, bounds, u, list(state["impulses"]))
