@@ -19,6 +19,9 @@ d and t = -(e . p) / (e . p' e - d . p), which is parallel to (e . p' e) d - p. 
 than e . p' e, the visit divides it by e . p' e, not by its length. So a visit changes nothing where the laws
 are obeyed, and only there.
 
+Of several contacts on a body such visits lead around a solution, in cycles where points stick and slide in
+turn. A visit of a redundant contact projects x - w / g on the cone instead, with the scales g.
+
 A joint with dry friction r and stops may have the velocities
 low <= w <= high in the step, where low <= 0 <= high. Its impulse is at most r against the motion between
 them, and any at a stop that exceeds r against it. That is a maximal monotone graph, of which a visit finds
@@ -57,9 +60,10 @@ PROXIMAL = 1e-8
 with a velocity that balances it at the impulses before the visit. A fixed point is the same. Tangents may
 depend on each other, as those of a robot that moves in a plane, and the sum is regular."""
 
-PROXIMAL_OF_REDUNDANT = 0.3
-"""The same part for several points of a body. Steps of their visits that are exact for given others lead
-around a solution in cycles where points stick and slide in turn."""
+INNER = 2
+"""Projections of normal and tangents one after the other in a visit of a redundant contact. Two of them in a
+visit reduce the residual as much as two visits, because the rows of a point are coupled more than two
+points."""
 
 LEAST_IMPULSE = 1e-20
 """Largest friction [N s] of a contact before a visit that counts as none."""
@@ -96,13 +100,13 @@ class Block:
     removed: list[Vector]
     """`own` - `G`."""
     G: list[Vector]
-    """Block of the Delassus matrix, with the proximal term on the diagonal of a contact."""
+    """Block of the Delassus matrix, with the proximal term on the diagonal unless it is redundant."""
     scales: Vector
     """Largest eigenvalue of G for the normal and for the tangents, or of a joint's row."""
     inverse: Vector
     """1 / scales; 0 where nothing can move."""
     sticking: list[Vector]
-    """-`G`^-1 of a contact; 0 where its normal depends on its tangents."""
+    """-`G`^-1 of a contact, 0 where its normal depends on its tangents; empty for a redundant one."""
     least_curvature: Any
     """Least e . p' e of a contact that slides, divided by -f_n mu."""
     least_slope: Any
@@ -124,12 +128,11 @@ def blocks_of(
         for place in {place for row in each for place in eliminated.Y[row]}:
             count[place] = count.get(place, 0) + 1
     shared = {place for place, n in count.items() if n > 1}
-    proximal = PROXIMAL_OF_REDUNDANT if redundant else PROXIMAL
-    return [_block(eliminated, pivots, each, shared, proximal) for each in rows]
+    return [_block(eliminated, pivots, each, shared, redundant) for each in rows]
 
 
 def _block(
-    eliminated: EliminatedRows, pivots: Sequence[Any], rows: list[int], shared: set[int], proximal: float
+    eliminated: EliminatedRows, pivots: Sequence[Any], rows: list[int], shared: set[int], redundant: bool
 ) -> Block:
     def shared_part(row: Velocities) -> Velocities:
         return {place: entry for place, entry in row.items() if place in shared}
@@ -155,9 +158,9 @@ def _block(
     inverse = [select(less(IMMOVABLE, each), 1.0 / (each + TINY), 0.0) for each in scales]
     sticking: list[Vector] = []
     moves: Any = 1.0
-    if len(rows) == 3:
+    if len(rows) == 3 and not redundant:
         for k, scale in enumerate((scales[0], scales[1], scales[1])):
-            G[k][k] = G[k][k] + proximal * scale
+            G[k][k] = G[k][k] + PROXIMAL * scale
         sticking, moves = _sticking(G)
     removed = [[a - b for a, b in zip(*each, strict=True)] for each in zip(own, G, strict=True)]
     least_curvature = select(moves, 0.0, scales[-1])
@@ -254,12 +257,16 @@ def block_sweep(
         done: list[Vector] = []
         for number in group:
             block = blocks[number]
-            f = block_velocity(block, c, u, x, free=True)
             held = [x[row] for row in block.rows]
-            if len(held) == 3:
-                new = _contact_impulses(block, friction[number], held, f)
+            if len(held) == 3 and not block.sticking:
+                w = block_velocity(block, c, u, x)
+                new = _projected_impulses(block, friction[number], held, w)
             else:
-                new = [_joint_impulse(block, bounds[number - len(friction)], f[0])]
+                f = block_velocity(block, c, u, x, free=True)
+                if len(held) == 3:
+                    new = _contact_impulses(block, friction[number], held, f)
+                else:
+                    new = [_joint_impulse(block, bounds[number - len(friction)], f[0])]
             steps = [a - b for a, b in zip(new, held, strict=True)]
             for row, impulse in zip(block.rows, new, strict=True):
                 x[row] = impulse
@@ -323,6 +330,28 @@ def _contact_impulses(block: Block, mu: Any, x: Vector, f: Vector) -> Vector:
     limit = mu * slides
     found = [slides, limit * ds, limit * dt]
     return [select(sticks, one, other) for one, other in zip(stuck, found, strict=True)]
+
+
+def _projected_impulses(block: Block, mu: Any, x: Vector, w: Vector) -> Vector:
+    """Return the impulses of a redundant contact for given others, after `INNER` projections of its normal
+    and its tangents, from impulses x (3,) and the velocities w (3,) with them."""
+    (a, b, c), (_, d, e), (_, _, f) = block.G
+    of_normal, of_tangents = block.inverse
+    n, s, t = x
+    wn, ws, wt = w
+    for number in range(INNER):
+        last = number == INNER - 1
+        new = maximum(0.0, n - wn * of_normal)
+        step, n = new - n, new
+        ws, wt = ws + b * step, wt + c * step
+        ys, yt = s - ws * of_tangents, t - wt * of_tangents
+        share = disk_share(mu * n, [ys, yt])
+        ds, dt = share * ys - s, share * yt - t
+        s, t = share * ys, share * yt
+        if not last:
+            wn = wn + a * step + b * ds + c * dt
+            ws, wt = ws + d * ds + e * dt, wt + e * ds + f * dt
+    return [n, s, t]
 
 
 def _joint_impulse(block: Block, bounds: JointBounds, free: Any) -> Any:
