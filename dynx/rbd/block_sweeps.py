@@ -98,15 +98,16 @@ class Block:
     own: list[Vector]
     """Part of the block of the Delassus matrix from entries that no other block has."""
     removed: list[Vector]
-    """`own` - `G`."""
+    """`own` - `G`; empty for a joint and for a redundant contact."""
     G: list[Vector]
-    """Block of the Delassus matrix, with the proximal term on the diagonal unless it is redundant."""
+    """Block of the Delassus matrix; of a contact that is not redundant with the proximal term."""
     scales: Vector
     """Largest eigenvalue of G for the normal and for the tangents, or of a joint's row."""
     inverse: Vector
     """1 / scales; 0 where nothing can move."""
     sticking: list[Vector]
-    """-`G`^-1 of a contact, 0 where its normal depends on its tangents; empty for a redundant one."""
+    """-`G`^-1 of a contact, 0 where its normal depends on its tangents; empty for a
+    joint and for a redundant contact."""
     least_curvature: Any
     """Least e . p' e of a contact that slides, divided by -f_n mu."""
     least_slope: Any
@@ -157,12 +158,13 @@ def _block(
         scales.append(largest_eigenvalue(G[1][1], G[2][2], G[1][2]))
     inverse = [select(less(IMMOVABLE, each), 1.0 / (each + TINY), 0.0) for each in scales]
     sticking: list[Vector] = []
+    removed: list[Vector] = []
     moves: Any = 1.0
     if len(rows) == 3 and not redundant:
         for k, scale in enumerate((scales[0], scales[1], scales[1])):
             G[k][k] = G[k][k] + PROXIMAL * scale
         sticking, moves = _sticking(G)
-    removed = [[a - b for a, b in zip(*each, strict=True)] for each in zip(own, G, strict=True)]
+        removed = [[a - b for a, b in zip(*each, strict=True)] for each in zip(own, G, strict=True)]
     least_curvature = select(moves, 0.0, scales[-1])
     least_slope = select(less(IMMOVABLE, scales[0]), LEAST_SHARE * scales[0], INFINITE)
     Y = [shared_part(eliminated.Y[row]) for row in rows]
@@ -258,15 +260,13 @@ def block_sweep(
         for number in group:
             block = blocks[number]
             held = [x[row] for row in block.rows]
-            if len(held) == 3 and not block.sticking:
-                w = block_velocity(block, c, u, x)
+            w = block_velocity(block, c, u, x, free=bool(block.sticking))
+            if block.sticking:
+                new = _contact_impulses(block, friction[number], held, w)
+            elif len(held) == 3:
                 new = _projected_impulses(block, friction[number], held, w)
             else:
-                f = block_velocity(block, c, u, x, free=True)
-                if len(held) == 3:
-                    new = _contact_impulses(block, friction[number], held, f)
-                else:
-                    new = [_joint_impulse(block, bounds[number - len(friction)], f[0])]
+                new = [_joint_impulse(block, bounds[number - len(friction)], held[0], w[0])]
             steps = [a - b for a, b in zip(new, held, strict=True)]
             for row, impulse in zip(block.rows, new, strict=True):
                 x[row] = impulse
@@ -354,9 +354,11 @@ def _projected_impulses(block: Block, mu: Any, x: Vector, w: Vector) -> Vector:
     return [n, s, t]
 
 
-def _joint_impulse(block: Block, bounds: JointBounds, free: Any) -> Any:
-    """Return the impulse of a joint for given others, which without it has the velocity `free`."""
-    held = _end_velocity(bounds, block.scales[0], free)
+def _joint_impulse(block: Block, bounds: JointBounds, x: Any, w: Any) -> Any:
+    """Return the impulse of a joint for given others."""
+    g = block.scales[0]
+    free = w - g * x
+    held = _end_velocity(bounds, g, free)
     return (held - free) * block.inverse[0]
 
 
