@@ -18,7 +18,7 @@ from dynx.envs.library import Space, spaces
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model.numbers import MAX_MAGNITUDE, is_real, positive_seconds
 from dynx.spatial.scalar import Floats
-from dynx.steppers.random import BLOCK_STEPS, Purpose, StepNumbers, Streams
+from dynx.steppers.random import BLOCK_STEPS, Purpose, StepNumbers, Streams, step_normals
 
 Range = float | Sequence[float] | Mapping[str, Sequence[float]]
 """One number; ``(low, high)`` for uniform numbers between them; ``{"log_uniform": (low, high)}``, or
@@ -338,13 +338,11 @@ class Pushes:
         duration = pushes.get("duration", PUSH_DURATION) / control_dt
         self._duration = max(1, round(min(duration, self._interval)))
         self._control_dt = control_dt
-        self._begin = np.zeros((count, BLOCK_STEPS), dtype=np.int64)
-        self._drawn = np.zeros((count, BLOCK_STEPS, 2))
-        self._blocks = np.full((count, 2), -1)
+        self._numbers = StepNumbers(count, 3, self._draw)
 
     def forget(self) -> None:
         """Draw anew, after the seeds have changed."""
-        self._blocks[:] = -1
+        self._numbers.forget()
 
     def at(
         self,
@@ -356,26 +354,21 @@ class Pushes:
         """Return the accelerations (n, 2) [m/s^2] along x and y of the world, of environments `rows` (n,) in
         `steps` (n,) of their `episodes`."""
         intervals, step = np.divmod(steps, self._interval)
-        blocks, place = np.divmod(intervals, BLOCK_STEPS)
-        drawn = self._blocks[rows]
-        for k in np.flatnonzero((drawn[:, 0] != episodes) | (drawn[:, 1] != blocks)).tolist():
-            self._draw(streams, int(rows[k]), int(episodes[k]), int(blocks[k]))
-        begin = self._begin[rows, place]
-        pushed = np.flatnonzero((begin <= step) & (step < begin + self._duration))
-        found = np.zeros((len(rows), 2))
-        found[pushed] = self._drawn[rows[pushed], place[pushed]]
-        return found
+        drawn = self._numbers.at(streams, rows, episodes, intervals)
+        begin = drawn[:, 0]
+        pushed = (begin <= step) & (step < begin + self._duration)
+        return np.where(pushed[:, None], drawn[:, 1:], 0.0)
 
-    def _draw(self, streams: Streams, row: int, episode: int, block: int) -> None:
+    def _draw(self, streams: Streams, row: int, episode: int, block: int, out: Floats) -> None:
+        """Draw the first step and the acceleration of the pushes in a block of intervals."""
         random, speed = np.empty((BLOCK_STEPS, 2)), np.empty(BLOCK_STEPS)
         streams.uniform(Purpose.PUSH, episode, block, random, row)
         draw = streams.normal if self._speed.kind == NORMAL else streams.uniform
         draw(Purpose.PUSH_SPEED, episode, block, speed, row)
-        self._blocks[row] = episode, block
-        self._begin[row] = np.floor(random[:, 0] * (self._interval - self._duration + 1))
         angle = 2.0 * np.pi * random[:, 1]
         acceleration = self._speed.numbers(speed) / (self._duration * self._control_dt)
-        self._drawn[row] = acceleration[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        out[:, 0] = np.floor(random[:, 0] * (self._interval - self._duration + 1))
+        out[:, 1:] = acceleration[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 class Variation:
@@ -491,7 +484,7 @@ class SpaceNoise:
         self._columns = {
             None if each.part is None else int(each.part): first + k for k, each in enumerate(parameters)
         }
-        self.numbers = StepNumbers(purpose, count, size)
+        self.numbers = step_normals(purpose, count, size)
         """Standard normal numbers of `count` environments."""
         self._low, self._high = (each.ravel().astype(np.float64) for each in (space.low, space.high))
 

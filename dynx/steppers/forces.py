@@ -177,9 +177,11 @@ def _as_given(value: object) -> str:
     return shown(value) if isinstance(value, str) else escaped(value)
 
 
-class EndMotors(NamedTuple):
-    """Motors of one robot with the torque torque + kp (target - q) + kd (velocity - v) at the end of a step,
-    within +-max_force: arrays (n,) over the velocity coordinates of the joints, zero without such a motor."""
+class JointLaw(NamedTuple):
+    """The law of motors of a robot: torque + kp (target - q) + kd (velocity - v), within +-max_force.
+
+    Arrays (n,) over joints, zero without a motor. If `implicit`, q and v are those at the end of a step.
+    """
 
     target: Floats
     velocity: Floats
@@ -187,9 +189,10 @@ class EndMotors(NamedTuple):
     kd: Floats
     torque: Floats
     max_force: Floats
+    implicit: bool
 
 
-NO_MOTORS: Mapping[int, EndMotors] = MappingProxyType({})
+NO_MOTORS: Mapping[int, JointLaw] = MappingProxyType({})
 
 
 class Forces(NamedTuple):
@@ -208,7 +211,7 @@ class Forces(NamedTuple):
     commands: Mapping[int, EngineCommand] = NO_COMMANDS
     """Commands to the engine's own motors by number of the robot, of classes in `Stepper.commands`. A mapping
     that is the same object as in the call before has the same commands."""
-    motors: Mapping[int, EndMotors] = NO_MOTORS
+    motors: Mapping[int, JointLaw] = NO_MOTORS
     """Motors at the end of each step by number of the robot, for an engine that `solves_motors`."""
 
 

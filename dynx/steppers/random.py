@@ -6,7 +6,7 @@ and an environment has the same numbers alone and among any number of others.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import Any
 
@@ -74,11 +74,12 @@ class Streams:
 
 
 class StepNumbers:
-    """Standard normal numbers of some environments in the steps of their episodes, drawn a block of steps at
-    a time."""
+    """Numbers of some environments in the steps of their episodes, drawn a block of steps at a time."""
 
-    def __init__(self, purpose: Purpose, count: int, size: int) -> None:
-        self._purpose = purpose
+    def __init__(self, count: int, size: int, draw: Callable[[Streams, int, int, int, Floats], None]) -> None:
+        """``draw(streams, row, episode, block, out)`` fills `out` (BLOCK_STEPS, size) for a block of steps of
+        an episode in environment `row`, one of `count`."""
+        self._draw = draw
         self._drawn = np.zeros((count, BLOCK_STEPS, size))
         self._blocks = np.full((count, 2), -1)
 
@@ -98,9 +99,18 @@ class StepNumbers:
         for k in np.flatnonzero((self._blocks[rows] != blocks).any(axis=1)).tolist():
             row = int(rows[k])
             episode, block = blocks[k].tolist()
-            streams.normal(self._purpose, episode, block, self._drawn[row], row)
+            self._draw(streams, row, episode, block, self._drawn[row])
         self._blocks[rows] = blocks
         return np.asarray(self._drawn[rows, steps % BLOCK_STEPS])
+
+
+def step_normals(purpose: Purpose, count: int, size: int) -> StepNumbers:
+    """Return standard normal numbers for a purpose."""
+
+    def draw(streams: Streams, row: int, episode: int, block: int, out: Floats) -> None:
+        streams.normal(purpose, episode, block, out, row)
+
+    return StepNumbers(count, size, draw)
 
 
 def stream_normals(seed: int, purpose: Purpose, lane: int, shape: Sequence[int]) -> Floats:

@@ -19,10 +19,10 @@ from dynx.errors import ArgumentError, ShapeError, UnknownNameError, Unsupported
 from dynx.model.numbers import checked_entries, real_array
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
-from dynx.steppers.forces import NO_COMMANDS, NO_MOTORS, EndMotors, EngineCommand, ExternalForce, Forces
+from dynx.steppers.forces import NO_COMMANDS, NO_MOTORS, EngineCommand, ExternalForce, Forces, JointLaw
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.stepper import Feature, Stepper
-from dynx.world.motors import JointLaw, Motor, combine
+from dynx.world.motors import Motor, combine
 from dynx.world.notes import LastLoads, RobotLoad
 from dynx.world.preparation import may_be_reached
 
@@ -132,7 +132,7 @@ class RobotLoads:
         return bool(self._motors) and not self._law.implicit
 
     @property
-    def end_motors(self) -> EndMotors | None:
+    def end_motors(self) -> JointLaw | None:
         """Motors whose law holds at the end of a step, for an engine that solves for it; None without any."""
         return self._end_motors if self._motors and self._law.implicit else None
 
@@ -176,13 +176,11 @@ class RobotLoads:
             self._ahead = implicit * self._h * law.kp
             self._inertia = implicit * self._h * (law.kd + self._h * law.kp)
             self._metric = np.diag(np.concatenate([np.zeros(self._base), self._inertia]))
-            self._end_motors = EndMotors(
-                law.target,
-                law.velocity,
-                implicit * law.kp,
-                implicit * law.kd,
-                implicit * law.torque,
-                np.where(implicit > 0.0, law.max_force, np.inf),
+            self._end_motors = law._replace(
+                kp=implicit * law.kp,
+                kd=implicit * law.kd,
+                torque=implicit * law.torque,
+                max_force=np.where(implicit > 0.0, law.max_force, np.inf),
             )
             self._saturates = bool(np.isfinite(law.max_force).any())
             joints = slice(self.model.nq - len(law.kp), None)
@@ -409,7 +407,7 @@ class Commands:
         self._wrenches: Floats = self._no_wrench
         self._on_frames: dict[int, OnFrames] = {}
         self._engine_commands: Mapping[int, EngineCommand] = NO_COMMANDS
-        self._end_motors: Mapping[int, EndMotors] = NO_MOTORS
+        self._end_motors: Mapping[int, JointLaw] = NO_MOTORS
         """Motors at the end of the last step for which the engine solved."""
         self._restored: Mapping[str, Floats] | None = None
         """Torques of robots in the step before the state was restored; None after the next step."""

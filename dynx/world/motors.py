@@ -16,7 +16,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,19 +33,7 @@ from dynx.errors import (
 from dynx.model import Model
 from dynx.model.numbers import checked_entries, real_array
 from dynx.spatial.scalar import Floats
-
-
-class JointLaw(NamedTuple):
-    """The law of motors, per joint: torque + kp (target - q) + kd (velocity - v), within +-max_force."""
-
-    target: Floats
-    velocity: Floats
-    kp: Floats
-    kd: Floats
-    torque: Floats
-    max_force: Floats
-    implicit: bool
-
+from dynx.steppers.forces import JointLaw
 
 LAW = ("target", "velocity", "kp", "kd", "torque", "max_force")
 """Numbers of a law."""

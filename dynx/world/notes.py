@@ -22,12 +22,13 @@ from dynx.model.mechanism import ROOT, Mechanism
 from dynx.model.tree import STANDARD_GRAVITY
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation, quat_log
+from dynx.steppers.forces import JointLaw
 from dynx.steppers.layout import Collider, ConstraintLayout, Layout, Owner
 from dynx.steppers.materials import inexact_materials
 from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper
 from dynx.world.boxes import owner_pose, shape_box
-from dynx.world.motors import JointLaw, combine
+from dynx.world.motors import combine
 from dynx.world.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import numpy as np
 
 from dynx.errors import shown
 from dynx.spatial.scalar import Floats
-from dynx.world.motors import JointLaw
+from dynx.steppers.forces import JointLaw
 
 
 def stiff_gains(

@@ -12,7 +12,7 @@ from dynx.envs.environment import TaskEnvironment
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.envs.vector import RobotVectorEnvironment
 from dynx.sim import Noise, simulate, simulate_batch
-from dynx.steppers.random import BLOCK_STEPS, Purpose, StepNumbers, Streams
+from dynx.steppers.random import BLOCK_STEPS, Purpose, Streams, step_normals
 
 
 def generator(seed: int, lane: int, purpose: int, block: int) -> np.random.Generator:
@@ -35,7 +35,7 @@ def test_a_block_has_the_numbers_of_numpy(purpose: Purpose, seed: int, lane: int
 
 
 def test_numbers_of_steps_do_not_depend_on_the_order_in_which_they_are_drawn() -> None:
-    streams, numbers, rng = Streams(4, 5, 6), StepNumbers(Purpose.ACTION, 3, 2), np.random.default_rng(0)
+    streams, numbers, rng = Streams(4, 5, 6), step_normals(Purpose.ACTION, 3, 2), np.random.default_rng(0)
     for _ in range(200):
         rows = np.flatnonzero(rng.random(3) < 0.7)
         episodes, steps = rng.integers(0, 4, len(rows)), rng.integers(0, 3 * BLOCK_STEPS, len(rows))

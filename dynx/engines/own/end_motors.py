@@ -6,7 +6,7 @@ import numpy as np
 
 from dynx.rbd.contact_step import ServoJoints, motor_law
 from dynx.spatial.scalar import Floats
-from dynx.steppers.forces import EndMotors
+from dynx.steppers.forces import JointLaw
 
 BLOCK_CORRECTIONS = 8
 """Number of corrections after which motors at their limits stay there, so that corrections end."""
@@ -24,7 +24,7 @@ class MotorsOfStep:
     again until nothing changes.
     """
 
-    def __init__(self, motors: EndMotors, h: float, positions: Floats, rates: Floats) -> None:
+    def __init__(self, motors: JointLaw, h: float, positions: Floats, rates: Floats) -> None:
         zero = np.zeros(len(rates))
         joints = ServoJoints(motors.kp, motors.kd, zero, zero)
         b, self._K = motor_law(joints, h, positions, rates, motors.target)

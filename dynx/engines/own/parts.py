@@ -20,7 +20,7 @@ from dynx.spatial.plain import rotation_rows
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
-from dynx.steppers.forces import EndMotors
+from dynx.steppers.forces import JointLaw
 from dynx.steppers.joint_stops import JointStops, bounds_of_step
 from dynx.steppers.layout import BodyLayout, RobotLayout, stop_positions
 from dynx.steppers.robot_step import RobotStep
@@ -85,7 +85,7 @@ class OwnRobot:
         self.free: Floats = self._no_torque
         """Velocity (nv,) at the end of the step without impulses."""
 
-    def step(self, tau: Floats | None, motors: EndMotors | None = None) -> None:
+    def step(self, tau: Floats | None, motors: JointLaw | None = None) -> None:
         """Take one step under a generalised force (nv,) and motors at its end."""
         before = self.q
         if motors is None:
@@ -102,7 +102,7 @@ class OwnRobot:
 
     # -- a step with impulses -----------------------------------------------------------------
 
-    def begin(self, tau: Floats | None, motors: EndMotors | None = None) -> None:
+    def begin(self, tau: Floats | None, motors: JointLaw | None = None) -> None:
         """Compute the free motion of a step under a generalised force (nv,) and motors at its end."""
         self._given = self._no_torque if tau is None else tau
         self._motors = None
