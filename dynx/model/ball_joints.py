@@ -1,8 +1,12 @@
-"""The refusal of ball joints by what takes robots whose joints have one coordinate each."""
+"""Refusals of ball joints: by what takes robots whose joints have one coordinate each, and for numbers that
+no ball joint has."""
 
 from __future__ import annotations
 
-from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
+from typing import NoReturn
+
+from dynx.errors import DescriptionError, EngineLimitError, UnsupportedFeatureError, shown
+from dynx.model.elements import Joint
 from dynx.model.tree import Tree
 
 BACKENDS_WITH_BALL_JOINTS = "the backends 'reference', 'compiled', 'pinocchio' and 'mujoco' do"
@@ -42,3 +46,19 @@ def _refusal(tree: Tree, what: str, instead: str) -> str:
 
 def _source(tree: Tree) -> str | None:
     return None if tree.source == "<memory>" else tree.source
+
+
+def refuse_numbers(joint: Joint, source: str) -> NoReturn:
+    """Raise DescriptionError for a largest angle below 0, or else UnsupportedFeatureError for a spring."""
+    if not joint.limits.upper >= 0.0:
+        raise DescriptionError(
+            f"the largest angle of ball joint {shown(joint.name)} is {joint.limits.upper}; wanted at least 0",
+            source=source,
+            line=joint.line,
+        )
+    raise UnsupportedFeatureError(
+        f"ball joint {shown(joint.name)} has a spring of {joint.dynamics.stiffness:g} N m/rad; ball joints "
+        "have none in dynx",
+        source=source,
+        line=joint.line,
+    )

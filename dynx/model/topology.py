@@ -40,7 +40,7 @@ def refuse_unbounded_numbers(links: Iterable[Link], joints: Iterable[Joint], sou
     for joint in joints:
         _require_bounded(f"joint {shown(joint.name)}", _of_joint(joint), source, joint.line)
         if joint.type == "ball" and (joint.dynamics.stiffness or not joint.limits.upper >= 0.0):
-            from dynx.model.ball_joint_errors import refuse_numbers
+            from dynx.model.ball_joints import refuse_numbers
 
             refuse_numbers(joint, source)
 
