@@ -1,9 +1,10 @@
-"""Examine every file of example-robot-data and pybullet_data as engines load it; write real_robots.md.
+"""Examine all files of example-robot-data and pybullet_data as engines load them; write real_robots.md.
 
     python -m docs.survey [--only erd|pybullet] [--engines a,b] [--jobs N] [--json OUT] [--mended FOLDER]
 
 Each file is examined on a fixed and on a floating base; see benchmarks/surveys/files.py for the options. The
-results are written as tables of causes and effects by robot.
+results are written as tables of causes and effects by robot. With ``--only`` the other section
+of the page stays, and with ``--engines`` the whole page.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from pathlib import Path
 
 import dynx
 from benchmarks.surveys.files import Entry, add_options, counts, make_tasks, remarks, survey
+from docs.page_parts import replaced
 
 _NO_ANSWER, _PRESENT = "no answer", "present"
 
+PAGE = Path(__file__).with_name("real_robots.md")
 GROUPS = {"erd": "example-robot-data", "pybullet": "pybullet_data"}
 
 
@@ -45,8 +48,13 @@ def main() -> None:
         entry["group"] = groups[entry["path"]]
     entries.sort(key=lambda entry: (entry["group"], entry["path"], entry["base"]))
     summary(entries)
-    if not options.only:
-        Path(__file__).with_name("real_robots.md").write_text(page(entries), encoding="utf-8")
+    if options.engines:
+        return  # the page is about all engines
+    text = PAGE.read_text(encoding="utf-8")
+    for group in sorted(set(groups.values())):
+        of = [entry for entry in entries if entry["group"] == group]
+        text = replaced(PAGE, text, group, "\n".join(section(of)) + "\n")
+    PAGE.write_text(text, encoding="utf-8")
 
 
 def summary(entries: Sequence[Entry]) -> None:
@@ -67,52 +75,21 @@ def exceptions(entry: Entry) -> Iterator[str]:
         yield line.replace(entry["path"], label(entry))
 
 
-def page(entries: Sequence[Entry]) -> str:
-    """The page: counts, then a table of causes and effects by robot."""
-    lines = [
-        "# Real robots: why engines differ on them",
-        "",
-        "Written by `python -m docs.survey`. Each engine loads every file by the call that users of the "
-        "engine make, with a fixed and with a floating base. dynx compares the results with reference values "
-        "([doctor](doctor.md)), and finds the causes of differences. [Rules](rules.md) explains the causes.",
-        "",
-        "- A file *differs* if an engine refuses it, cannot be used for it, or has a wrong result. A result "
-        "is wrong if it differs from the reference values by more than 1e-12.",
-        "- A file is *refused* if dynx cannot read it.",
-        "",
-        "The tables list only proved causes. The columns are:",
-        "",
-        "- *places*: the number of places in the file that have the cause.",
-        "- *effect*: the change of an engine's result when dynx removes only this cause, relative to the "
-        "largest reference value. If the cause has several places or affects several engines, this is the "
-        "largest effect. `no answer` means that the engine refuses the file, or cannot compute the quantity, "
-        "until the cause is removed. `present` means that the cause changes contact forces. For contact "
-        "forces the table has no number.",
-        "- *engines*: the engines that the cause affects.",
-        "",
-        "[Public files](public_files.md) has figures on files that were not used to develop the doctor.",
-        "",
-    ]
-    for group, title in GROUPS.items():
-        of = [entry for entry in entries if entry["group"] == group]
-        if not of:
-            continue
-        lines += [f"## {title}", ""]
-        lines += [
-            f"- {base} base: {counts([entry for entry in of if entry['base'] == base])}"
-            for base in ("fixed", "floating")
-        ]
-        lines += ["", "| file | base | cause | places | effect | engines |", "|---|---|---|---|---|---|"]
-        lines += merged([row for entry in of for row in rows(entry)])
-        left = [f"- {label(entry)}, {entry['base']}: {line}" for entry in of for line in exceptions(entry)]
-        if left:
-            unread = (
-                "The next list has files that dynx refused, and engines without results for a file. Such an "
-                "engine was not used, or does not load the file even after dynx's repair:"
-            )
-            lines += ["", unread, "", *left]
-        lines.append("")
-    return "\n".join(lines)
+def section(entries: Sequence[Entry]) -> Iterator[str]:
+    """Yield the lines of a collection: counts, causes and effects by robot, files without results."""
+    for base in ("fixed", "floating"):
+        yield f"- {base} base: {counts([entry for entry in entries if entry['base'] == base])}"
+    yield from ("", "| file | base | cause | places | effect | engines |", "|---|---|---|---|---|---|")
+    yield from merged([row for entry in entries for row in rows(entry)])
+    left = [f"- {label(entry)}, {entry['base']}: {line}" for entry in entries for line in exceptions(entry)]
+    if left:
+        yield ""
+        yield (
+            "The next list has files that dynx refused, and engines without results for a file. Such an "
+            "engine was not used, or does not load the file even after dynx's repair:"
+        )
+        yield ""
+        yield from left
 
 
 def rows(entry: Entry) -> Iterator[tuple[str, ...]]:

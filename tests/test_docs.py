@@ -6,6 +6,7 @@ import importlib
 import json
 import re
 import runpy
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from docs import page_parts, sentences, write_contacts, write_engines, write_results
+from benchmarks.surveys.robot_pairs import PairResult, read_pairs
+from docs import (
+    page_parts,
+    pairs,
+    public_files,
+    sentences,
+    survey,
+    write_contacts,
+    write_engines,
+    write_results,
+)
 from dynx import load
 from dynx.cli.shell.main import cli
 from dynx.contacts import case_names
@@ -209,6 +220,58 @@ def test_each_measured_table_has_its_command_and_machine(page: str, name: str, c
     machine = rf"^\*{day}; .*\d doubles in a vector, .* cores.*; Python .*\*$"
     assert re.search(machine, part, re.MULTILINE)
     assert re.search(r"^\||^```text", part, re.MULTILINE)
+
+
+def written_part(page: Path, name: str) -> str:
+    """Return the text between the marks of a part of a page."""
+    return (
+        page.read_text(encoding="utf-8")
+        .partition(f"<!-- written: {name} -->\n")[2]
+        .partition("<!-- end -->")[0]
+    )
+
+
+def test_the_list_of_public_files_is_as_its_program_writes_it() -> None:
+    written = written_part(public_files.PAGE, "sources")
+    files = [
+        {"half": part, "repo": repository, "commit": commit}
+        for part, listed in re.findall(r"^Part (\w): (.*)\.$", written, re.MULTILINE)
+        for repository, commit, count in re.findall(r"([^ ,]+)@(\w+) \((\d+)\)", listed)
+        for _ in range(int(count))
+    ]
+    assert public_files.sources(files) == written
+
+
+def test_the_tables_of_public_files_are_as_their_program_writes_them() -> None:
+    causes: dict[str, Counter[str]] = {part: Counter() for part in "ABC"}
+    written = written_part(public_files.PAGE, "causes")
+    for rule, *counts in re.findall(
+        r"^\| \[(DX\d+)\].*? \| (\d+) \| (\d+) \| (\d+) \|$", written, re.MULTILINE
+    ):
+        for counter, count in zip(causes.values(), counts, strict=True):
+            counter[rule] = int(count)
+    assert public_files.causes_table(causes) == written
+    assert written_part(public_files.PAGE, "figures").startswith(page_parts.table(public_files.HEADS, []))
+
+
+def test_the_tables_of_pairs_are_as_their_program_writes_them() -> None:
+    listed = read_pairs()
+    results = [PairResult(pair, "different", "", 1, 0, 0.5, "link a<b", engines=0.25) for pair in listed]
+    written = dict(pairs.parts(results))
+    assert written["repositories"] == written_part(pairs.PAGE, "repositories")
+    for part in ("bar", "develop"):
+        current = written_part(pairs.PAGE, part)
+        assert [row.split(" | ")[:2] for row in current.splitlines()[2:]] == [
+            row.split(" | ")[:2] for row in written[part].splitlines()[2:]
+        ]
+        assert " | different | 1 |  | 0.5: link a&lt;b | 0.25 |\n" in written[part]
+
+
+def test_the_survey_of_real_robots_writes_a_part_for_each_collection() -> None:
+    for group in survey.GROUPS:
+        written = written_part(survey.PAGE, group)
+        assert written.startswith("- fixed base: ")
+        assert "\n".join(survey.section([])).splitlines()[2:5] == written.splitlines()[2:5]
 
 
 def test_results_of_benchmarks_become_tables() -> None:
