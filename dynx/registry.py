@@ -174,10 +174,10 @@ class ClassRegistry(Generic[Kind]):
         return tuple(dict.fromkeys([*self.built_in, *self._registered, *points]))
 
     def register(self, name: str, loader: Callable[[], type[Kind]]) -> None:
-        """Add a class of the running program. `loader()` returns the class; dynx calls it at the first use.
+        """Add a class of the running program under `name`.
 
-        Raises ArgumentError for a name that is taken: a class is never replaced. Installed packages add their
-        classes by entry points.
+        `loader()` returns the class; dynx calls it at the first use of the class. Installed packages add
+        their classes by entry points instead. Raises ArgumentError for a name that is taken.
         """
         if not isinstance(name, str) or not name:
             raise ArgumentError(f"a {self._word}'s name is {shown(name)}; wanted a str that is not empty")

@@ -68,17 +68,21 @@ def agree(
 ) -> AgreementReport:
     """Compare the results of backends on a robot.
 
-    `model` is a `Model` or whatever `dynx.load` takes. `backends` are names (default: all installed backends,
-    for a robot with ball joints those that take them) or backends made of this model, which dynx does not
-    close. dynx compares every quantity pairwise at
-    `samples` states that follow from `seed`, and with the 50-digit referee at `referee_samples` of these
-    states. It compares quantities that an engine computes itself with those that dynx derives from the
-    engine's poses and inverse dynamics. It also tests each backend against the identities of mechanics.
+    `model` is a `Model` or any argument of `dynx.load`. `backends` are names, or backends made of this model,
+    which stay open. By default all installed backends take part. For a robot with ball joints these are the
+    backends that accept ball joints.
+
+    - dynx compares each pair of backends in every quantity at `samples` states, which follow from `seed`.
+    - At `referee_samples` of these states, dynx compares each backend with the 50-digit referee.
+    - If an engine computes a quantity itself, dynx compares the result with the value that dynx derives from
+      the engine's poses and inverse dynamics.
+    - dynx tests each backend alone against the identities of mechanics.
+
     `progress` is called with the name of each step.
 
-    A robot that cannot be read, or that a backend refuses, gives a report with `error` set. Raises
-    ArgumentError for arguments that are invalid for every robot, UnknownBackendError and
-    NotInstalledError for a backend that is unknown or whose engine is missing.
+    If dynx cannot read the robot, or a backend refuses it, the report has `error` set. Raises ArgumentError
+    for arguments that are invalid for every robot, UnknownBackendError for an unknown backend, and
+    NotInstalledError for a backend whose engine is missing.
     """
     started = time.perf_counter()
     chosen = _check_arguments(backends, samples, seed, referee_samples)

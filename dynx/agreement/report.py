@@ -140,9 +140,10 @@ class LoadFailure:
 class AgreementReport:
     """The agreement of backends on one robot; true in a condition if they agree.
 
-    `quantities` are comparisons of results, `identities` checks of each backend alone, and `suspects` the
-    backends that are probably wrong where results differ. If the robot was refused, `error` is set and
-    nothing is compared.
+    - `quantities`: comparisons of results
+    - `identities`: checks of each backend alone
+    - `suspects`: the backends that are probably wrong if results differ
+    - `error`: why the robot was refused. Then nothing is compared
     """
 
     robot: str

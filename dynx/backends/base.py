@@ -37,42 +37,41 @@ if TYPE_CHECKING:
 class Backend(QuantityCalls):
     """A robot in one engine, with the same methods, conventions and results for every engine.
 
-    Arrays are float64 and take leading batch axes, which broadcast: q (..., nq), v, a, tau
-    (..., nv). One sample in, one sample out. SI units. Poses are T_world_frame (..., 4, 4).
-    Jacobians (..., 6, nv) have linear rows first; `reference` names the axes and the point:
+    Arrays are float64 and take leading batch axes, which broadcast: q (..., nq), v, a, tau (..., nv). One
+    sample in, one sample out. SI units. Poses are T_world_frame (..., 4, 4). Jacobians (..., 6, nv) have
+    linear rows first; `reference` names the axes and the point:
 
     - ``"local_world_aligned"`` (default): the frame's origin, the world's axes
     - ``"local"``: the frame's origin and axes
     - ``"world"``: the world's origin and axes (the spatial Jacobian)
 
-    `point` (3,) [m], in the frame's axes, replaces the frame's origin in the first two.
+    `point` (3,) [m], in the frame's axes, replaces the frame's origin in the first two cases.
 
-    `joint_dynamics=True` adds the armature, viscous damping, Coulomb friction and springs of the joints,
-    which every backend computes alike. It adds
-    ``armature * a + damping * v + friction * sign(v) + stiffness * (q - spring_reference)`` to the torque,
-    armature to the diagonal of the mass matrix, and the energy of the springs to the potential energy. By
-    default only the rigid bodies count.
+    By default only the rigid bodies count. `joint_dynamics=True` adds the armature, viscous damping, Coulomb
+    friction and springs of the joints, alike on every backend. The torque of these terms is
+    ``armature * a + damping * v + friction * sign(v) + stiffness * (q - spring_reference)``. The armature is
+    on the diagonal of the mass matrix, and the potential energy includes the energy of the springs.
 
-    `external_forces` maps frame names to wrenches (..., 6), force [N] then moment [N m], that act on the
-    robot; `force_reference` names their point and axes as `reference` does for a Jacobian.
+    `external_forces` maps frame names to wrenches (..., 6) that act on the robot: force [N], then moment
+    [N m]. `force_reference` names their point and axes, as `reference` does for a Jacobian.
 
     Torques are generalised forces: [N m] for a revolute joint, [N] for a prismatic joint. For a floating base
     they are the force and the moment at the origin of the base frame, in its axes. `dynx.backends.quantities`
     is the table of all quantities.
 
-    A batch is a Python loop over the engine's calls unless the class is `vectorized`; NumPy evaluates a batch
-    of the backend ``reference`` at once. The backend ``compiled`` gives the same numbers to rounding, and
-    evaluates a batch for UR5 at least about 60 times as fast (``dynx bench ur5 --batch 65536 --threads 1``;
-    ``dynx bench`` measures each on your machine).
+    For a batch, dynx calls the engine once for each sample, in a Python loop. A class that is `vectorized`
+    computes a batch at once, such as ``reference`` (by NumPy) and ``compiled`` (by machine code). These two
+    give the same numbers, up to rounding. For UR5 ``compiled`` is at least about 60 times as fast as
+    ``reference`` (``dynx bench ur5 --batch 65536 --threads 1``).
 
-    Raises errors of `dynx.errors` only. With ``validate=False`` arguments are not checked: they must be
-    float64 arrays of the right shape, and the result for any other is undefined.
+    Raises only errors of `dynx.errors`. With ``validate=False`` dynx does not check arguments. They must then
+    be float64 arrays of the right shape; other arguments give undefined results.
     """
 
     # -- kinematics ---------------------------------------------------------------------------
 
     def forward_kinematics(self, q: ArrayLike, frame: str | Sequence[str] | None = None) -> Floats:
-        """Return T_world_frame (..., 4, 4) [1, m]; for several frames, or None for all, (..., n, 4, 4).
+        """Return T_world_frame (..., 4, 4) [1, m]; for a list of frames, or None for all, (..., n, 4, 4).
 
         Featherstone 2008, section 4.4. Elsewhere: Pinocchio `framesForwardKinematics`, Drake
         `CalcPoseInWorld`, MuJoCo `mj_kinematics`, PyBullet `getLinkState`.
@@ -93,8 +92,7 @@ class Backend(QuantityCalls):
         reference: str = LOCAL_WORLD_ALIGNED,
         point: ArrayLike | None = None,
     ) -> Floats:
-        """Return the geometric Jacobian J (..., 6, nv) [m/rad, 1]: J v is the velocity of `frame`, linear
-        rows first.
+        """Return the geometric Jacobian J (..., 6, nv) [m/rad, 1]: J v is the frame's velocity, linear first.
 
         Siciliano et al., eq. 3.30. Elsewhere: Pinocchio `computeFrameJacobian`, Drake
         `CalcJacobianSpatialVelocity`, MuJoCo `mj_jac`, PyBullet `calculateJacobian`.

@@ -44,11 +44,11 @@ unregister = _backends.unregister
 
 
 def backend(name: str, model: Model, **options: Any) -> Backend:
-    """Return the backend of that name for `model`; `options` go to its constructor (``validate=False``).
+    """Return the backend `name` for `model`; its constructor gets the `options`, such as ``validate=False``.
 
-    Raises UnknownBackendError for an unknown name, NotInstalledError where its engine is
-    missing, EngineLimitError where the engine cannot represent the model, and ArgumentError for an
-    option that the backend does not have or anything but a `Model`.
+    Raises UnknownBackendError for an unknown name, NotInstalledError if the engine is missing,
+    EngineLimitError if the engine cannot represent the model, and ArgumentError for an option that the
+    backend does not have, or if `model` is not a `Model`.
     """
     kind = backend_class(name)
     refuse_other_than_model(model)
@@ -61,7 +61,7 @@ def backend(name: str, model: Model, **options: Any) -> Backend:
 
 
 def installed_backends() -> tuple[str, ...]:
-    """Return the names among `backend_names` whose engines can be imported; this imports them."""
+    """Import the engine of each backend, and return the names of the backends whose import succeeds."""
     return tuple(name for name in backend_names() if _is_installed(name))
 
 

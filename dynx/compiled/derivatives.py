@@ -71,14 +71,14 @@ class ForwardDynamicsDerivatives(NamedTuple):
 
 @checks_types
 class Derivatives:
-    """Partial derivatives for one robot, of single samples and of batches.
+    """Partial derivatives of the kinematics and dynamics of one robot, for single samples and for batches.
 
-    Arrays are float64 with leading batch axes that broadcast, as in `Backend`. The derivative of f(q) is that
-    of f(model.integrate(q, d)) with respect to the displacement d (nv,) at d = 0. For a floating base d is a
-    translation and a rotation in the axes of the base; for joints these are ordinary partial derivatives. The
-    unit is the unit of f divided by the unit of the variable.
+    Arrays are float64 with leading batch axes that broadcast, as in `Backend`. The derivative of f(q) is the
+    derivative of f(model.integrate(q, d)) with respect to the displacement d (nv,) at d = 0. For joints this
+    is the ordinary partial derivative. For a floating base, d contains a translation and a rotation in the
+    axes of the base. The unit is the unit of f divided by the unit of the variable.
 
-    Damping, friction, armature, springs and external forces are not included.
+    The derivatives do not include damping, friction, armature, springs and external forces.
 
     A batch is split over at most `threads` threads; None stands for one per processor. Kernels are compiled
     when they are first needed and kept in the cache of `dynx.simd.cache`. Several threads may share an

@@ -43,12 +43,14 @@ def parametric(
 ) -> ParametricDynamics:
     """Return the dynamics of `model` with parameters as arguments.
 
-    - `links`: all ten inertial parameters of each of these links, which replace those of the model
-    - `payload`: ten inertial parameters of a body fixed to this frame, about its origin and in its axes;
-      zeros by default
-    - `point_payload`: mass and position of a point mass fixed to this frame, in its axes
-    - `joint_dynamics`: damping, dry friction and armature of every moving joint, and their springs in a robot
-      that has any
+    These options choose the parameters:
+
+    - `links`: the ten inertial parameters of each of these links. They replace the parameters of the model
+    - `payload`: the ten inertial parameters of a body that is fixed to this frame, about the origin of the
+      frame and in its axes. The default values are zeros
+    - `point_payload`: mass and position of a point mass that is fixed to this frame, in the axes of the frame
+    - `joint_dynamics`: damping, dry friction and armature of every moving joint, and the springs of the
+      joints if the robot has any
 
     A batch is split over at most `threads` threads; None stands for one per processor. Raises
     UnknownNameError for an unknown link or frame, ArgumentError for a link named twice.

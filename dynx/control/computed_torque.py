@@ -25,11 +25,11 @@ from dynx.trajectory.base import Setpoint
 class ComputedTorque(ModelBased[None], pure=True):
     """tau = ID(q, v, a* + kd (v* - v) + kp (q* - q)).
 
-    ID is inverse dynamics; q*, v* and a* are the setpoint. With an exact model the error e of each coordinate
-    obeys e'' + kd e' + kp e = 0, independent of the other coordinates (Spong, Hutchinson and Vidyasagar,
-    Robot Modeling and Control, section 8.3). In discrete time an error of about dt a* kd / (2 kp) remains;
-    `DiscreteComputedTorque` does not have this error. With `joint_dynamics` ID includes the joint dynamics of
-    the description.
+    ID is inverse dynamics; q*, v* and a* are the setpoint. If the model is exact, the error e of each
+    coordinate obeys e'' + kd e' + kp e = 0, independent of the other coordinates (Spong, Hutchinson and
+    Vidyasagar, Robot Modeling and Control, section 8.3). In discrete time an error of about
+    dt a* kd / (2 kp) remains; `DiscreteComputedTorque` avoids this error. With `joint_dynamics` ID includes
+    the joint dynamics of the description.
     """
 
     kp: Floats = gain("1/s^2")

@@ -457,25 +457,33 @@ def diagnose(
     counterexamples: bool = True,
     progress: Progress | None = None,
 ) -> DoctorReport:
-    """Find and prove the causes for which engines that load this robot's file differ, and mend the file.
+    """Find and prove why engines that load a robot file differ, and mend the file.
 
-    `robot` is any argument of `dynx.load`. `base` is the base of a robot in URDF, ``"fixed"`` by default;
-    files in MJCF and SDF state their base. `engines` are names of `dynx.loaded.ENGINES` and of
-    `dynx.loaded.VARIANTS` (default: all engines that are installed and load files of this format). Each
-    engine loads the file by its documented call. dynx compares it with reference values at `samples` random
-    states that follow from `seed`, in tilted gravity. A relative error above `tolerance` is a difference. By
-    default common variants are examined too (`DoctorReport.variants`); they differ by the user's call, which
-    no file can mend, so they count as differences only if `engines` names them. In the mended file no cause
-    has an effect above `fix_tolerance`, and new numbers have the fewest digits that keep every engine within
-    a tenth of `fix_tolerance`. By default this limit is `tolerance`, and new numbers have all digits.
-    `choose` maps rule ids to one of the rule's `choices`. `level` is the largest change of the mended file:
-    ``safe`` changes nothing that a reader notices, ``rounding`` the equations of motion by rounding only,
-    ``physics`` whatever the causes require. `ignore` has ids or names of rules whose findings make no check
-    fail; with `only`, findings of all other rules make no check fail. They stay in `findings`, are counted in
-    `DoctorReport.ignored`, and are mended. `counterexamples` selects the search for the smallest robot that
-    shows a difference which no rule explains. `progress` is called with the name of each step.
+    Each engine loads the file by its documented call. dynx compares the engine with reference values at
+    random states, in tilted gravity.
 
-    A robot that cannot be read gives a report with `error` set, whose `findings` are the places without a
+    - `robot`: any argument of `dynx.load`
+    - `base`: the base of a robot in URDF, ``"fixed"`` by default; files in MJCF and SDF state their base
+    - `engines`: names of `dynx.loaded.ENGINES` and of `dynx.loaded.VARIANTS`; by default all engines that are
+      installed and load files of this format. A variant is another common call of an engine. By default
+      dynx also examines variants (`DoctorReport.variants`). No change of the file can mend a call. So the
+      differences of a variant count only if `engines` names the variant
+    - `samples`, `seed`: the number of states, and the seed from which they follow
+    - `tolerance`: the relative error above which an engine differs
+    - `fix_tolerance`: the largest effect that a cause has in the mended file. New numbers have the fewest
+      digits that keep every engine within a tenth of this limit. By default the limit is `tolerance`, and new
+      numbers have all digits
+    - `choose`: maps rule ids to one of the rule's `choices`
+    - `level`: the largest change of the mended file. ``safe`` changes nothing that a reader of the file
+      notices, ``rounding`` changes the equations of motion only by rounding, and ``physics`` makes every
+      change that the causes require
+    - `ignore`, `only`: ids or names of rules. Findings of the rules in `ignore`, and of all rules that are
+      not in `only`, make no check fail. Such findings stay in `findings`, count in `DoctorReport.ignored`,
+      and are mended
+    - `counterexamples`: whether dynx searches for the smallest robot with a difference that no rule explains
+    - `progress`: called with the name of each step
+
+    If dynx cannot read the robot, the report has `error` set, and its `findings` are the places without a
     remedy. Raises ArgumentError, UnknownBackendError, NotInstalledError and UnknownNameError for arguments
     that are invalid for any robot.
     """

@@ -203,13 +203,16 @@ class Change:
 class DoctorReport:
     """Causes of the differences between engines on a file, with proofs; truthy if they do not differ.
 
-    `residual` is the largest relative error that remains after mending, `referee` that of the reference
-    values themselves (mass matrix and inverse dynamics at one state) against 50 digits. `choices` are
-    sentences on the decisions where the file is ambiguous and on the changes to the physics of the robot.
-    `level` is the highest level of the remedies in the mended file. `changes` are the changes of these
-    remedies, and the changes that the level leaves undone. `model_difference` lists the values of engines
-    that the file does not state. `variants` are other common calls of the engines; they count neither for
-    `alike` nor for `explained`, `findings` and `residual`.
+    - `residual`: the largest relative error that remains after mending
+    - `referee`: the relative error of the reference values themselves against 50 digits (mass matrix and
+      inverse dynamics at one state)
+    - `choices`: sentences on the decisions where the file is ambiguous, and on the changes to the physics of
+      the robot
+    - `level`: the highest level of the remedies in the mended file
+    - `changes`: the changes of these remedies, and the changes that the level leaves undone
+    - `model_difference`: values in engines that the file does not state
+    - `variants`: other common calls of the engines. They do not count for `alike`, `explained`, `findings`
+      and `residual`
     """
 
     robot: str

@@ -208,7 +208,7 @@ def kernel_engine(kind: type[Task]) -> str | None:
 def register_task(env_id: str, task: str | type[Task]) -> None:
     """Register a task, so that ``gymnasium.make(env_id, engine=...)`` makes its environment.
 
-    An id is ``namespace/Name-v0``. An environment of that id is replaced.
+    `env_id` has the form ``namespace/Name-v0``. The new environment replaces an environment with this id.
     """
     kind = task_class(task)
     registry.pop(env_id, None)

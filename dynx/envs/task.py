@@ -100,7 +100,7 @@ class Outcome(NamedTuple):
 
 
 class Task(ABC):
-    """A task, with its options as the fields of a frozen dataclass; it keeps no state.
+    """A task of reinforcement learning: a frozen dataclass without state, whose fields are its options.
 
     Derive your task from the subclass for its kind of motion: `dynx.envs.RobotTask` (a robot without
     contacts, on any backend) or `dynx.envs.WorldTask` (a scene with contacts, on any world engine).

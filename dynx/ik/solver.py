@@ -64,42 +64,47 @@ def inverse_kinematics(
 ) -> IKResult:
     """Find a configuration within limits that brings `frame` to `target`.
 
-    `target` is a pose T_world_target (..., 4, 4), or a position (..., 3) [m] with free rotation. With
-    ``free="position"`` it is a rotation (..., 3, 3), with ``free="rotation"`` a position, or a pose whose
-    other part is ignored. Several frames are reached at once with ``target={"left_hand": T_left, ...}``, or
-    with a list of `FrameTarget`, each with options of its own; `frame` is None then.
+    **Target.** `target` is a pose T_world_target (..., 4, 4), or a position (..., 3) [m], which leaves the
+    rotation free. With ``free="position"`` the target is a rotation (..., 3, 3), with ``free="rotation"`` a
+    position. A pose is valid in both cases; dynx ignores its other part. For several frames at once, give
+    ``target={"left_hand": T_left, ...}``, or a list of `FrameTarget`, each with its own options. Then `frame`
+    is None.
 
-    `dynx.ik.options.Options` describes each option, with its unit. With `free`, `weights` or tolerances along
-    axes a target need not be reached in every direction. ``free="rotation_z"`` leaves the rotation about the
-    target's z axis free (a welding torch). ``free=("position_x", "rotation")`` leaves the position on a line
-    free, with any rotation.
+    **Options.** `dynx.ik.options.Options` describes each option, with its unit. With `free`, `weights` or
+    tolerances along axes, the frame need not reach the target in every direction. ``free="rotation_z"``
+    leaves the rotation about the target's z axis free (a welding torch). ``free=("position_x", "rotation")``
+    leaves free the position along the target's x axis, and the rotation.
 
-    The search starts at `q0` (..., nq), moved into the limits (`IKResult.note` says so), or at a random
-    configuration if q0 is None. Targets and q0 broadcast. A start is abandoned after `max_iterations` steps,
-    or sooner if it stagnates; the search then restarts at a random configuration, up to `max_restarts` times.
-    With a seed `rng` (the default) equal calls return equal results, and each sample of a batch has the
-    result that it has alone.
+    **Search.** The search starts at `q0` (..., nq), or at a random configuration if q0 is None. dynx moves a
+    q0 outside the limits into the limits, and `IKResult.note` says so. Targets and q0 broadcast. The search
+    gives up a start after `max_iterations` steps, or sooner if the error stagnates. Then it starts again at a
+    random configuration, up to `max_restarts` times. If `rng` is a seed (the default), equal calls return
+    equal results, and a sample of a batch has the same result as alone.
 
-    Only the joints between root and frames move, and a floating base; the others stay at q0 (or at the
-    neutral configuration). Angles whose range is a full turn are returned nearest to q0.
+    Only the joints between root and frames move, and a floating base. All other joints stay at q0, or at the
+    neutral configuration. If the range of an angle is a full turn, dynx returns the value nearest to q0.
 
-    The result is checked by forward kinematics. If a target is not reached, no error is raised, and the
-    result has the best q found. The status is UNREACHABLE if the target is farther than the chain is long, so
-    that no configuration reaches it (`dynx.ik.reach`). It is TIMED_OUT if `timeout` [s] stopped the search,
-    otherwise NOT_FOUND. With TIMED_OUT, samples of a batch that were not begun have the start as q and NaN as
-    errors.
+    **Result.** dynx checks the result by forward kinematics. If the search does not reach a target, dynx
+    raises no error, and the result has the best q found. The status is then one of these:
 
-    With `avoid`, a scene or what `Scene.avoidance` returns, a solution keeps the robot's links at least a
-    margin from the obstacles and from one another, by certified distances (`dynx.distance`). dynx replaces a
-    solution that is closer: by another of the closed form or of further starts, or by moving redundant
-    joints. If each solution found is too close, the status is IN_COLLISION and the message names the pair.
+    - UNREACHABLE: the target is farther than the chain is long, so no configuration reaches it
+      (`dynx.ik.reach`)
+    - TIMED_OUT: `timeout` [s] stopped the search. Samples of a batch that were not begun have the start as q
+      and NaN as errors
+    - IN_COLLISION: every solution found is too close to an obstacle (see `avoid`)
+    - NOT_FOUND: all other cases
 
-    With ``all_solutions=True`` the result is an `IKSolutions` with every configuration within limits that
-    reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). A closed form
-    exists for six revolute joints with a spherical wrist or three parallel axes, and for many arms with
-    prismatic joints. `given` holds positions [rad or m] of further joints between root and frame, such as one
-    joint of seven. Angles are those nearest to q0, or to 0; `IKSolutions.with_full_turns` lists the others
-    within the limits. The options of the search have no effect then.
+    **Obstacles.** `avoid` is a scene or a result of `Scene.avoidance`. A solution then keeps the robot's
+    links at least a margin from the obstacles and from one another, by certified distances (`dynx.distance`).
+    If a solution is too close, dynx takes another solution of the closed form or of further starts, or moves
+    redundant joints. With the status IN_COLLISION the message names the pair that is too close.
+
+    **All solutions.** With ``all_solutions=True`` the result is an `IKSolutions`: every configuration within
+    limits that reaches a pose, from the closed form (`dynx.ik.closed_form`), with the names of the branches.
+    A closed form exists for six revolute joints with a spherical wrist or three parallel axes, and for many
+    arms with prismatic joints. `given` has the positions [rad or m] of further joints between root and frame,
+    such as one joint of seven. Angles are those nearest to q0, or to 0. `IKSolutions.with_full_turns` adds
+    the other angles within the limits. The options of the search have no effect here.
 
     Raises UnknownNameError for the frame or the name of an option; ArgumentError (ShapeError, DTypeError,
     NotFiniteError) for an invalid argument, and for method ``"engine"`` if the backend has no solver of its

@@ -440,29 +440,39 @@ def velocity_ik(
     avoid_gain: float = 5.0,
     timeout: float | None = None,
 ) -> VelocityResult:
-    """Find the velocity v (nv,) at q (nq,) that meets tasks best and keeps the limits for `dt` [s].
+    """Find the joint velocity v (nv,) at q (nq,) that meets tasks best and keeps the limits for `dt` [s].
 
-    v minimises the sum of ``|W (J v - velocity)|^2`` of the tasks that are not hard, of ``posture_weight^2
-    |v - posture_gain (posture - q)|^2`` over the joints if a `posture` (nq,) is given, and of ``damping
-    |v|^2`` (damping > 0), under the hard tasks and the bounds: ``q + dt v`` is within the position limits,
-    |v| within `velocity_limit` (one number or (nv,), by default the model's), and with `acceleration_limit`
-    [rad/s^2 or m/s^2] the joints can stop before their limits; with `v0` (nv,), the velocity before, the
-    change is at most ``acceleration_limit dt``. A joint outside its position limits returns to them as fast
-    as the other bounds allow, and `note` names it. A base that floats has no bounds but those given.
+    v minimises the sum of these terms:
 
-    With `avoid`, a scene or what `Scene.avoidance` returns, the distance d of each pair of bodies that is
-    near changes by at least ``-avoid_gain (d - margin)`` [m/s], its damper: d does not fall below the margin,
-    and where it is below, it grows back. `avoid_gain` [1/s] is at most ``1 / dt``. Pairs count from
-    where 1 m/s is allowed (``1 / avoid_gain`` m). The distances at ``model.integrate(q, dt v)`` are certified
-    (`dynx.distance`): where a margin is not kept there, the step is found again with that pair as a further
-    constraint, and shortened if that is not enough; `too_fast` names pairs for which no velocity suffices.
-    After `timeout` [s] no further step is sought: the robot stands still unless the last one found is clear.
+    - ``|W (J v - velocity)|^2`` of each task that is not hard
+    - ``posture_weight^2 |v - posture_gain (posture - q)|^2`` over the joints, if a `posture` (nq,) is given
+    - ``damping |v|^2``, with damping > 0
 
-    The bounds always hold. Next come the dampers, then the hard tasks, then the others. If the hard tasks
-    contradict each other, the bounds or the dampers, they count as soft ones of a large weight, and `success`
-    is False; so it is if the dampers contradict the bounds. The quadratic programme is solved by DAQP (extra
-    ``qp``). Siciliano et al., section 3.5, with inequalities as in Kanoun, Lamiraux and Wieber, IEEE Trans.
-    Robotics 27(4), 2011.
+    v meets the hard tasks, and keeps these bounds:
+
+    - ``q + dt v`` is within the position limits
+    - |v| is within `velocity_limit`: one number or (nv,), by default the limit of the model
+    - with `acceleration_limit` [rad/s^2 or m/s^2], the joints can still stop before their position limits
+    - with the previous velocity `v0` (nv,), the change of the velocity is at most ``acceleration_limit dt``
+
+    A joint outside its position limits returns as fast as the other bounds allow, and `note` names the joint.
+    A floating base has only the bounds that you give.
+
+    **Obstacles.** `avoid` is a scene or a result of `Scene.avoidance`. The distance d of a pair of near
+    bodies then changes by at least ``-avoid_gain (d - margin)`` [m/s]. This bound is the *damper* of the
+    pair. It keeps d above the margin, and makes a smaller d grow. `avoid_gain` [1/s] is at most ``1 / dt``.
+    Bodies are near if d - margin is at most ``1 / avoid_gain`` m. There the damper allows 1 m/s. dynx
+    certifies the distances at ``model.integrate(q, dt v)`` (`dynx.distance`). If a pair does not keep its
+    margin there, dynx solves again with this pair as a further constraint. If that is not enough, dynx
+    shortens the step. `too_fast` names the pairs for which no velocity suffices. After `timeout` [s] dynx
+    seeks no further step: the robot stands still unless the last step found is clear.
+
+    **Order.** The bounds always hold. Next come the dampers, then the hard tasks, then the other tasks. If
+    the hard tasks contradict each other, the bounds or the dampers, they count as soft tasks of a large
+    weight, and `success` is False. If the dampers contradict the bounds, `success` is False, too.
+
+    DAQP solves the quadratic programme (extra ``qp``). Siciliano et al., section 3.5, with inequalities as in
+    Kanoun, Lamiraux and Wieber, IEEE Trans. Robotics 27(4), 2011.
 
     Raises NotInstalledError without the extra; UnknownNameError for a frame; ArgumentError (ShapeError,
     DTypeError, NotFiniteError) for an invalid argument.

@@ -112,9 +112,9 @@ def rigid_matrix(T: ArrayLike, name: str) -> Floats:
 
 @dataclass(frozen=True)
 class Pose:
-    """URDF's ``<origin>``: translation `xyz` [m], then roll-pitch-yaw `rpy` [rad].
+    """A pose as in URDF's ``<origin>``: translation `xyz` [m] and rotation `rpy` (roll, pitch, yaw) [rad].
 
-    Raises ShapeError unless each has three entries.
+    Raises ShapeError if `xyz` or `rpy` does not have three entries.
     """
 
     xyz: Vector = ZERO

@@ -32,18 +32,18 @@ if TYPE_CHECKING:
 class Model(Tree):
     """A robot: links and joints in depth-first order, its base, and gravity.
 
-    Create one with `dynx.load` or `Model.build`. Coordinates (`q`, `v`) list the moving joints in the order
-    of `joint_names`: depth-first from the root, children in the order of the document. With a floating base,
-    ``q[:3]`` is the position of the base frame in the world [m], and ``q[3:7]`` its unit quaternion (x, y, z,
-    w). ``v[:3]`` and ``v[3:6]`` are its linear [m/s] and angular [rad/s] velocity, both expressed in the base
-    frame. A ball joint has a unit quaternion (x, y, z, w) in q, the attitude of its child in the joint's
-    frame. In v it has the angular velocity of the child relative to the parent, in the axes of the child. A
-    fixed base has the pose `base_pose` in the world.
+    `dynx.load` and `Model.build` create a model. The coordinates (`q`, `v`) list the moving joints in the
+    order of `joint_names`: depth-first from the root, children in the order of the document.
 
-    `geometry` has the visual and collision shapes of the links, `contact_filter` the shapes that may touch,
-    and `configurations` the named configurations. `actuators`, `sensors`, `tendons`, `equalities` and
-    `gravity_compensation` are data. None of these fields affects the dynamics, and `==` ignores them;
-    `actuator_forces` computes the torques of the actuators.
+    - Floating base: ``q[:3]`` is the position of the base frame in the world [m], ``q[3:7]`` its unit
+      quaternion (x, y, z, w), ``v[:3]`` its linear [m/s] and ``v[3:6]`` its angular velocity [rad/s], both in
+      the axes of the base frame. A fixed base has the pose `base_pose` in the world
+    - Ball joint: q has the attitude of the child in the joint's frame, as a unit quaternion (x, y, z, w).
+      v has the angular velocity of the child relative to the parent, in the axes of the child
+
+    `geometry` (visual and collision shapes), `contact_filter` (shapes that may touch), `configurations`,
+    `actuators`, `sensors`, `tendons`, `equalities` and `gravity_compensation` do not affect the dynamics, and
+    `==` ignores them. `actuator_forces` computes the torques of the actuators.
 
     Models are immutable. You can compare them by content (`==`), hash and pickle them.
     """

@@ -248,9 +248,9 @@ def point_mass(mass: Any, center: Array) -> RigidInertia:
 class Payload:
     """A rigid body fixed to a frame of the robot.
 
-    `mass` is in kg, `center` (3,) [m] is the centre of mass in `frame`, and `inertia` (3, 3) [kg m^2] the
-    tensor about the centre of mass, in the axes of `frame`. The default is a point mass. Raises ArgumentError
-    for numbers that no body has.
+    `mass` is in kg, and `center` (3,) [m] is the centre of mass in `frame`. `inertia` (3, 3) [kg m^2] is the
+    tensor about the centre of mass, in the axes of `frame`. Without `inertia` the body is a point mass.
+    Raises ArgumentError for a mass or an inertia that no body can have.
     """
 
     frame: str

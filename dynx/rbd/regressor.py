@@ -195,9 +195,9 @@ def _times(row: Array, A: Array) -> Array:
 
 @checks_types
 def inertial_parameters(model: Model, convert: ScalarConverter = float64) -> Array:
-    """Return pi (10 n_links,): the ten parameters of each of `model.links`, zeros without an inertial.
+    """Return the inertial parameters pi (10 n_links,) of all `model.links`; zeros without an inertial.
 
-    `convert` gives arrays of another scalar type. Raises ArgumentError if it changes the shape.
+    `convert` gives arrays of another scalar type. Raises ArgumentError if `convert` changes the shape.
     """
     if np.shape(made := convert(np.zeros(3))) != (3,):
         raise ArgumentError(

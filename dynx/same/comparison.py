@@ -113,17 +113,23 @@ def same_robot(
         report = dynx.same_robot("arm.urdf", "arm.xml")
         assert report.same, report.differences
 
-    `a` and `b` are what `dynx.load` takes: files, text, names, models, in any of its formats. `base` is the
-    base of both; by default a URDF file has the base that the other description states, or a fixed one.
+    `a` and `b` are arguments of `dynx.load`: files, text, names, models, in any of its formats. `base` is the
+    base of both robots. By default a URDF file has the base that the other description states, or a fixed
+    base.
 
-    dynx merges links across fixed joints. It compares the lines of the joint axes at the zero positions, and
-    the base inertial parameters of the bodies (Gautier and Khalil 1990). Frames of links, the signs of axes,
-    and inertia that affects no motion may differ (`SameReport.freedoms`). The robots are the same if all else
-    differs by at most `tolerance` of its scale: the reach of the robot for lengths, 1 rad for angles, the
-    body's own inertia for inertias. dynx computes differences in 50 digits from the decimals of the files. If
-    the robots differ, the report has the fewest elements of `b` to replace, and `b` with these replaced.
+    dynx merges links that fixed joints connect. It compares the lines of the joint axes at the zero
+    positions, and the base inertial parameters of the bodies (Gautier and Khalil 1990). The frames of links,
+    the signs of axes, and inertia that affects no motion may differ (`SameReport.freedoms`). The robots are
+    the same if every other value differs by at most `tolerance` times its scale:
 
-    Raises the errors of `dynx.load`; ArgumentError for a `tolerance` that is no number from 0 to below 1.
+    - lengths: the reach of the robot
+    - angles: 1 rad
+    - inertias: the inertia of the body
+
+    dynx computes differences in 50 digits from the decimals of the files. If the robots differ, the report
+    lists the fewest elements of `b` to replace, and has `b` with these elements replaced.
+
+    Raises the errors of `dynx.load`, and ArgumentError for a `tolerance` below 0 or not below 1.
     """
     start = time.perf_counter()
     if not (is_real(tolerance) and 0.0 <= tolerance < 1.0):

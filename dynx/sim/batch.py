@@ -543,36 +543,36 @@ class BatchArguments(ScenarioArguments):
 def simulate_batch(given: BatchArguments) -> BatchRollouts:
     """Simulate many rollouts of `model` under `controller` along `reference`, by semi-implicit Euler.
 
-    Controller, dynamics and integrator are compiled into one kernel, with one rollout in each vector lane.
-    These arguments may have one row for each rollout:
+    dynx compiles controller, dynamics and integrator into one kernel, in which each lane of a vector computes
+    one rollout. These arguments may have one row for each rollout:
 
     - `parameters` (n, p) of `parametric`, a `dynx.parametric` of the model: payloads, inertias, damping, dry
       friction and armature that the controller does not know
-    - `gains`: arrays (n,) or (n, size) by the name of a gain of the controller, as ``{"kp": ...}``; of a
-      controller of your own by the name of a public attribute that is a number or an array of numbers
-    - `joint_damping`, `joint_friction`, `joint_armature` (n,), (n, 1) or (n, joints); a number, numbers
-      (joints,) or True hold for all rollouts, as in `simulate`; numbers by joint can be (n,),
-      ``{"elbow_joint": [0.1, 0.2]}``. With True, the default, values in `parameters` replace those of the
+    - `gains`: arrays (n,) or (n, size) by the name of a gain, such as ``{"kp": ...}``. A gain of your own
+      controller is a public attribute that is a number or an array of numbers
+    - `joint_damping`, `joint_friction`, `joint_armature`: arrays (n,), (n, 1) or (n, joints), or numbers (n,)
+      by joint, such as ``{"elbow_joint": [0.1, 0.2]}``. A number, numbers (joints,) or True hold for all
+      rollouts, as in `simulate`. With True, the default, values in `parameters` replace those of the
       description
-    - `q0` (n, nq), `v0` (n, nv); one row holds for all rollouts. The default is the start of the reference,
-      and rest if `q0` is given
+    - `q0` (n, nq), `v0` (n, nv); one row holds for all rollouts. By default the rollouts begin at the start
+      of the reference. If only `q0` is given, they begin at rest
     - `noise` of the measurements: rollout k has the noise of ``simulate`` with ``Noise(..., rollout=k)``
 
-    `rollouts` is the number n of rollouts; it is needed if no argument has n rows. All other options are
-    those of `simulate`; an `integrator` other than semi-implicit Euler and `substeps` are refused. With a
-    payload or scaled masses, `parametric` has to be made from ``plant_model(model, payload, mass_scale)``.
-    With `record_every` = k every k-th state is recorded.
+    `rollouts` is the number n of rollouts. Give it if no argument has n rows. All other options are those of
+    `simulate`. dynx refuses `substeps`, and every `integrator` except semi-implicit Euler. With a payload or
+    scaled masses, make `parametric` from ``plant_model(model, payload, mass_scale)``. With `record_every` = k
+    the batch records every k-th state.
 
     The first argument may also be a robot's name or file, or a `Scenario` on the plant ``compiled``. Together
     with a scenario you can give only arguments that may differ between rollouts. `BatchRollouts.scenario` is
     the scenario that all rollouts share.
 
-    The batch is divided into parts, which run on `threads` threads (None: one per processor) or in any
-    `concurrent.futures` `executor`, such as one of processes or of a cluster. The results are the same bit
-    for bit. `keep` is a folder in which each finished part is stored; a run that is started again with the
-    same arguments continues from there. A part that cannot be stored, for example because the disk is full,
-    is still in the result, and a RuntimeWarning names the reason. Ctrl-C raises BatchInterrupted, which has
-    the finished rollouts. `progress` is called after each part.
+    dynx divides the batch into parts. They run on `threads` threads (None: one per processor), or in an
+    `executor` of `concurrent.futures`, such as one of processes or of a cluster. The results are the same bit
+    for bit. dynx stores each finished part in the folder `keep`. If you start a run again with the same
+    arguments, it continues from there. If dynx cannot store a part, for example because the disk is full, the
+    part is still in the result, and a RuntimeWarning names the reason. Ctrl-C raises BatchInterrupted, which
+    has the finished rollouts. `progress` is called after each part.
 
     Raises ArgumentError, GainError, LimitError, SingularMassMatrixError as `simulate` does, and
     UnsupportedFeatureError for controllers that branch on their measurement. A rollout that diverges does not

@@ -579,29 +579,25 @@ def compare(
     ours: Scene, theirs: Sequence[str], duration: float, dt: float = 1e-3, **options: Any
 ) -> WorldComparison: ...
 def compare(ours: Any, theirs: Any, *given: Any, **options: Any) -> Any:
-    """Find out how far apart two motions are.
+    """Find out how far apart two motions are, and why.
 
-    - ``compare(rollout, rollout, tolerance=, rerun=, progress=)``: two rollouts of a robot, or logs that
-      `Rollout.load` reads, and the differences of their scenarios that cause the distance
-      (`RolloutComparison`).
-    - ``compare(scene, engines, duration, dt=1e-3, substeps=, settings=, samples=, finish=, progress=)``: the
-      motions of one scene in the worlds of several engines (`dynx.world.WorldComparison`).
+    ``compare(rollout, rollout, tolerance=, rerun=, progress=)`` returns a `RolloutComparison` of two rollouts
+    of a robot, or of logs that `Rollout.load` reads. A *difference* of their scenarios is an argument of
+    `simulate`, a gain, a link or a joint. For each difference dynx simulates twice: first it copies only this
+    difference from `theirs` into `ours`, then it copies all other differences. If dynx copies all
+    differences, the new rollout must equal `theirs`. This proves that nothing else is a cause. `tolerance` is
+    the distance [rad or m] up to which rollouts are alike. Without `rerun` dynx only lists the differences.
+    `progress` is called with the number of finished simulations and their total number.
 
-    dynx takes over each single difference of two scenarios (an argument of `simulate`, a gain, a link, a
-    joint) from `theirs` into `ours`, and simulates again. Then it takes over all differences except this one,
-    and simulates again. If it takes over all differences, the rerun must equal `theirs`. This proves that
-    nothing else is a cause. `tolerance` is the distance [rad or m] up to which rollouts are alike. Without
-    `rerun` dynx only lists the differences. `progress` is called with the number of reruns done and their
-    total number.
-
-    The engines run the scene for `duration` [s] in steps of `dt` / `substeps` [s], with the `settings` of
-    `World` by engine; states are compared at `samples` times. `finish` is called with each world at its end,
-    and `progress` with the name of the engine and the time reached. An engine that fails in a step ends its
-    run there.
+    ``compare(scene, engines, duration, dt=1e-3, substeps=, settings=, samples=, finish=, progress=)`` returns
+    a `dynx.world.WorldComparison` of the motions of one scene on several engines. Each engine runs the scene
+    for `duration` [s] in steps of `dt` / `substeps` [s]. `settings` maps engines to settings of `World`. dynx
+    compares the states at `samples` times. `finish` is called with each world at its end, and `progress` with
+    the name of the engine and the time reached. If an engine fails in a step, its run ends there.
 
     Raises ArgumentError for rollouts of robots with other coordinates or without a common time, for anything
     but two rollouts or a scene with its engines, and for an invalid tolerance; UnknownNameError for an option
-    of another name, TypeError for other arguments that do not fit; the errors of `World` for a scene that
+    of another name; TypeError for other arguments that do not fit; the errors of `World` for a scene that
     cannot be opened.
     """
     comparing = compare_engines if isinstance(ours, Scene) else _compare_rollouts

@@ -29,11 +29,11 @@ a batch, which follow it, still fit."""
 class Noise:
     """Gaussian noise on measurements: standard deviations of `q` [rad or m] and `v`, and a seed.
 
-    A standard deviation is one number, or one for each coordinate (nv,); for the pose of a floating base it
-    is a displacement along the axes of the base. Equal seeds give equal noise in every plant. ``Noise(...,
-    rollout=17)`` gives a single rollout the noise of rollout 17 of a batch with the same seed; for a batch,
-    `rollout` is the number of its first rollout. Seed and rollout also determine the random numbers of a
-    controller (`Controller.random_size`).
+    A standard deviation is one number, or one number for each coordinate (nv,). For the pose of a floating
+    base it belongs to a displacement along the axes of the base. Equal seeds give equal noise on every plant.
+    A single rollout with ``Noise(..., rollout=17)`` has the noise of rollout 17 of a batch with the
+    same seed. For a batch, `rollout` is the number of its first rollout. Seed and rollout also determine the
+    random numbers of a controller (`Controller.random_size`).
     """
 
     q: ArrayLike = 0.0

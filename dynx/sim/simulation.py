@@ -621,57 +621,47 @@ class SimulateArguments(ScenarioArguments):
 def simulate(given: SimulateArguments) -> Rollout:
     """Simulate `model` under `controller` along `reference`, and return the record.
 
-    The first argument may also be a robot's name or file, which `dynx.load` reads, or a `Scenario`. The
-    fields of a scenario are the other arguments. Together with a scenario you can give only `resume`, `step`
-    and `progress`.
+    `model` may also be a robot's name or file for `dynx.load`, or a `Scenario`, whose fields are the other
+    arguments. Together with a scenario you can give only `resume`, `step` and `progress`.
 
-    The plant and the controller can use different engines (``controller_backend`` replaces the backend of the
-    controller). So you can study the effect of an error in one engine.
+    **Motion.** `reference` is a trajectory, one configuration (nq,) to hold, or None. Without a controller
+    the robot has no motors. The initial state is `q0`, `v0`. By default it is the state of the scene, the
+    start of the reference, or the neutral configuration.
 
-    **Plant.** ``plant="pybullet"`` is PyBullet's own stepper. With ``integrator="engine"``, the plants
-    ``"mujoco"`` and ``"drake"`` are the steppers of MuJoCo and Drake. Any other name is a backend whose
-    forward dynamics an `integrator` of dynx integrates. Integrators are ``semi_implicit`` (the default: v
-    then q, the scheme of Bullet), ``rk4``, and ``adaptive`` (SciPy's `method` with `rtol`, `atol`).
-    ``plant="pybullet", integrator="rk4"`` is PyBullet's forward dynamics under RK4. Without a controller
-    (None) the robot has no motors. A `ScenePlant` is the robot in a scene, with contacts; the rollout then
-    has `surroundings`. `reference` is a trajectory, one configuration (nq,) to hold, or None. The initial
-    state is `q0`, `v0`; by default the state of the scene, the start of the reference, or the neutral
-    configuration.
+    **Plant.** ``plant="pybullet"`` is PyBullet's own stepper. With ``integrator="engine"``, ``"mujoco"`` and
+    ``"drake"`` are the steppers of MuJoCo and Drake. Any other name is a backend whose forward dynamics dynx
+    integrates: ``semi_implicit`` (the default: v, then q, as Bullet does), ``rk4``, or ``adaptive`` (SciPy's
+    `method`). ``plant="pybullet", integrator="rk4"`` is PyBullet's forward dynamics under RK4. A `ScenePlant`
+    is the robot in a scene, with contacts; the rollout then has `surroundings`. To study the effect of an
+    error in one engine, give the controller another one by `controller_backend`.
 
-    **Time** [s]. `dt` is the step of the record; the plant takes `substeps` steps in each. The controller
-    runs every `control_dt` (by default `dt`), and its torque is held in between. It measures the state as it
-    was `delay` earlier, or the initial state if that is before the start; `control_dt` and `delay` are
-    multiples of `dt`. The default `duration` is the duration of the reference. It is rounded up to a multiple
-    of `dt`. After the end of the reference, the setpoint is its last configuration.
+    **Time** [s]. In each time step `dt` of the record the plant takes `substeps` steps. The controller runs
+    every `control_dt`, and its torque stays constant in between. It measures the state of the time `delay`
+    earlier, at first the initial state. At the end of the reference its last configuration stays the
+    setpoint.
 
-    **Joints**, the same in every plant: `joint_damping`, dry `joint_friction` and `joint_armature`. Each is
-    True for the values of the description (the default, as in a world), False for zero, one number, or one
-    number for each joint. With numbers by joint, ``{"elbow_joint": 0.5}``, the value of all other joints is
-    zero. Dry friction holds a joint at rest up to its magnitude and opposes the motion beyond
-    (`dynx.rbd.joint_friction`), at any step. With `friction_slip` [rad/s or m/s] above 0 it is smoothed over
-    that speed instead, so loaded joints creep (`JointFriction`). `effort_limits` (True: those of the model)
-    saturate torques, and `Rollout.saturated` states in which steps. With `joint_limits` joints stop at the
-    limits of the description: inelastically (`dynx.steppers.joint_stops`), in a scene by the engine's own
-    law. `pushes` are external wrenches.
+    **Joints.** `joint_damping`, `joint_friction` (dry) and `joint_armature` are True for the values of the
+    description (the default, as in a world), False for zero, one number, or one number for each joint. In
+    ``{"elbow_joint": 0.5}`` the value of all other joints is zero. Dry friction holds a joint at rest up to
+    its magnitude, and opposes the motion of a moving joint, for any time step (`dynx.rbd.joint_friction`).
+    With `friction_slip` above 0 loaded joints creep (`JointFriction`). `effort_limits` is True for the limits
+    of the model; `Rollout.saturated` states in which steps they act. `joint_limits` stops joints at the
+    limits of the description (`dynx.steppers.joint_stops`), in a scene by the law of the engine.
 
-    **Model error.** The plant has a `payload` and masses scaled by `mass_scale` (all links, or some) that the
-    controller does not know; `noise` is added to the measurements. dynx computes the readings of `sensors`,
-    and of the sensors of a scene, after the simulation (`Rollout.sensors`); controllers do not use them.
+    **Model error.** The controller knows neither the `payload` nor `mass_scale`. `noise` is added to its
+    measurements. Sensors (`Rollout.sensors`) are computed after the simulation; controllers do not use them.
 
-    **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record, and the
-    rest is computed. The result equals the result of one run, to the last bit. The record's scenario must be
-    equal to this one in every field but `duration`. The controller must have no state but the one that it
-    returns.
+    **Resuming.** dynx keeps the first `step` steps (by default all) of the record `resume`, and computes the
+    rest. The result equals that of one run, to the last bit. The scenario of the record must equal this one
+    in every field except `duration`. The controller must have no state except the one that it returns.
 
     **Long runs.** `progress` is called regularly with the number of steps taken and the total number. Ctrl-C
-    raises RolloutInterrupted, which has the record until then in ``.rollout``, from which you can resume.
-    Before the simulation is set up (setpoints, plant) there is no record, and Ctrl-C raises Python's
-    KeyboardInterrupt.
+    raises RolloutInterrupted, whose ``.rollout`` is the record until then, from which you can resume. While
+    dynx still sets up the simulation there is no record, and Ctrl-C raises Python's KeyboardInterrupt.
 
-    Raises ArgumentError for a scenario that cannot be simulated, or that differs from the scenario of the
-    record to resume; LimitError for a reference outside the limits of position and velocity (unless
-    `check_reference` is False) or an effort limit of 0; DivergedError and ControlError in a step, with the
-    record until then in ``error.rollout``.
+    Raises ArgumentError for a scenario that cannot be simulated, or that differs from that of `resume`;
+    LimitError for an effort limit of 0, or (if `check_reference`) a reference outside the limits of position
+    and velocity; DivergedError and ControlError in a step, whose ``.rollout`` is the record until then.
     """
     if isinstance(given.model, Scenario) and given.controller_backend is not None:
         raise ArgumentError(

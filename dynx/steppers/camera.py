@@ -24,13 +24,14 @@ MAX_SIDE = 8192
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera at `pose` in the frame of `part`, a body or ``robot/link`` that carries it, or in the
-    world.
+    """A pinhole camera.
 
-    Its axes are x to the right of the picture, y down and z along the optical axis. `field_of_view` is the
-    vertical angle [rad], between the upper and the lower edge of the picture, `size` its width and height in
-    pixels, which are square. What is nearer than `near` or farther than `far` [m] along the optical axis is
-    not seen.
+    - `part`: the body or ``robot/link`` that carries the camera. Without it the camera stands in the world
+    - `pose`: the pose of the camera in the frame of `part`, or in the world. The x axis of the camera points
+      to the right of the picture, y points down, and z is the optical axis
+    - `field_of_view`: the vertical angle [rad] between the upper and the lower edge of the picture
+    - `size`: width and height of the picture in pixels, which are square
+    - `near`, `far`: the camera sees only what is between these distances [m] along the optical axis
     """
 
     pose: Pose = IDENTITY

@@ -157,10 +157,10 @@ def cycloidal(q0: ArrayLike, q1: ArrayLike, duration: float, *, model: Model | N
 
         q = q0 + (q1 - q0) (t/T - sin(2 pi t/T) / (2 pi))
 
-    The largest speed is 2 (q1 - q0) / T, at T/2; the largest acceleration 2 pi (q1 - q0) / T^2, at T/4 and
-    3T/4. A robot with a floating base or ball joints needs its `model`: the base moves along one screw axis,
-    and v, a are in its axes; the child link of a ball joint turns about one axis. A quaternion of q1 may be
-    returned with the opposite sign, which is the same orientation.
+    The largest speed is 2 (q1 - q0) / T, at T/2. The largest acceleration is 2 pi (q1 - q0) / T^2, at T/4 and
+    3T/4. For a robot with a floating base or ball joints, give its `model`. The base then moves along one
+    screw axis, and v, a are in its axes. The child link of a ball joint turns about one axis. The end of the
+    motion may have a quaternion of q1 with the opposite sign, which is the same orientation.
 
     Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for invalid arguments.
     """

@@ -77,20 +77,22 @@ def line(
 ) -> LineTrajectory:
     """Return a motion from `q0` (nq,) that moves `frame` on a straight line to the pose `target`.
 
-    `target` is T_world_target (4, 4), or a position (3,) [m], which leaves the rotation free. Each inverse
-    kinematics search starts at the previous configuration, so a redundant arm takes the nearest solution.
+    `target` is a pose T_world_target (4, 4), or a position (3,) [m], which leaves the rotation free. Each
+    search of inverse kinematics starts at the previous configuration. So a redundant arm takes the nearest
+    solution. Joints that do not move the frame stay at q0. The base must be fixed.
 
-    The motion law s(t) (time scaling) along the line is a quintic from rest to rest in `duration` [s], or any
-    trajectory `law` of one coordinate from [0] to [1], such as ``trapezoidal([0], [1], velocity=0.5,
-    acceleration=2)``. The value 1 is the end of the line. ``cubic([0], [1], T, v0=[1 / T], v1=[1 / T])`` has
-    constant speed. `Backend.track` follows other paths, sampled as poses. The frame deviates at most
-    `deviation` [m] and `rotation_deviation` [rad] from the line at any time; the measured deviations are
-    attributes of the trajectory. Joints that do not move the frame stay at q0. Only for a fixed base.
+    The time law s(t) is the fraction of the line that the frame has passed at time t. By default it is a
+    quintic from rest to rest in `duration` [s]. You can give any trajectory `law` of one coordinate from [0]
+    to [1] instead, such as ``trapezoidal([0], [1], velocity=0.5, acceleration=2)``. The law
+    ``cubic([0], [1], T, v0=[1 / T], v1=[1 / T])`` has constant speed.
 
-    Raises TrajectoryError if from some fraction `at` (0 to 1) of the line on, no configuration within limits
-    is found near the previous one, or the bounds are not met. There the arm is near a singularity, or has to
-    change its posture. Raises TrajectoryError, too, if no motion is found within `timeout` [s]. Raises
-    ArgumentError for invalid arguments.
+    The frame deviates at most `deviation` [m] and `rotation_deviation` [rad] from the line at any time. The
+    measured deviations are attributes of the trajectory. `Backend.track` follows other paths, given as poses.
+
+    Raises TrajectoryError if dynx finds no configuration within limits near the previous one, or cannot keep
+    the bounds on the deviation. The error states the fraction `at` (0 to 1) of the line. There the arm is
+    near a singularity, or has to change its posture. Raises TrajectoryError, too, if dynx finds no motion
+    within `timeout` [s], and ArgumentError for invalid arguments.
     """
     time_limit = TimeLimit(timeout)
     path = _StraightLine(model, frame, q0, target, backend)

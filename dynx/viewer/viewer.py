@@ -707,8 +707,8 @@ class Viewer(Controls):
 
 
 def view(shown: object, **options: Any) -> Viewer:
-    """Return the `Viewer` of a robot, a rollout or a world; in a notebook it is shown inline.
+    """Return the `Viewer` of a robot, a rollout or a world.
 
-    The port is a free one unless `port` is given.
+    A notebook shows the viewer inline. By default dynx takes a free `port`.
     """
     return Viewer(shown, **{"port": 0, **options})

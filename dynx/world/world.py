@@ -171,16 +171,19 @@ LoadsOf = Callable[["World"], Mapping[str, Any]]
 class World:
     """The robots and bodies of a scene in motion, with contacts, in steps of `dt` [s].
 
-    Each step consists of `substeps` steps of the engine. `joint_limits`, `joint_damping`, `joint_friction`,
-    `joint_armature` and `joint_springs` switch these properties of the robot descriptions on or off. If the
-    engine does not have a part of the joint dynamics, dynx computes it. Without `collisions` there are no
-    contacts.
-    `settings` are settings of the engine (`World.settings`); the reference of worlds lists them.
+    Each step consists of `substeps` steps of the engine.
 
-    With `keep_last_step`, or for a scene with sensors, the world keeps the state before each step of the
-    engine. `joint_wrenches` and `base_wrench` need this state. With `contact_interval` [s] the world sums the
-    contacts of each step of the engine, and `mean_contacts` returns their mean over that time. With either
-    option a step takes longer.
+    - `collisions`: whether there are contacts
+    - `joint_limits`, `joint_damping`, `joint_friction`, `joint_armature`, `joint_springs`: whether the world
+      has these properties of the robot descriptions. If the engine lacks a part of the joint dynamics, dynx
+      computes this part
+    - `settings`: settings of the engine (`World.settings`). The reference of worlds lists them
+    - `keep_last_step`: whether the world keeps the state before each step of the engine, which
+      `joint_wrenches` and `base_wrench` need. A world with sensors always keeps this state
+    - `contact_interval` [s]: the time over which `mean_contacts` returns the mean of the contacts. The world
+      then sums the contacts of each step of the engine
+
+    With either of the last two options a step takes longer.
 
     Close a world by `close` or by a ``with`` block. dynx checks arguments before it calls the engine. A call
     that raises an error leaves the state unchanged.
@@ -320,13 +323,14 @@ class World:
     ) -> None:
         """Take `n` steps of `dt`, during which torques, motors and external forces act.
 
-        `torques` maps robots to generalised forces (nv,); `motors` maps robots to a motor or a list of them,
-        whose law is evaluated in every step of the engine. The motors of the scene act on robots that neither
-        `torques` nor `motors` names. A force acts from its start, a time of this world, for its duration.
+        - `torques`: maps robots to generalised forces (nv,)
+        - `motors`: maps robots to a motor or a list of motors. Every step of the engine evaluates the law of
+          each motor. The motors of the scene act on robots that neither `torques` nor `motors` names
+        - `forces`: each force acts from its start, a time of this world, for its duration
 
-        Raises ArgumentError and its subclasses for arguments, DivergedError with the likely cause if the
-        state stops being finite. After that, and after Ctrl-C in a step, the world is at the last state that
-        was read, or at a later one at most 1,000 steps old.
+        Raises ArgumentError and its subclasses for invalid arguments, and DivergedError with the likely cause
+        if the state is no longer finite. After DivergedError, and after Ctrl-C in a step, the world is at the
+        last state that was read, or at a later state that is at most 1,000 steps old.
         """
         if wrong:  # checked here, because a decorator would take 4 % of a step of one body
             refuse_options("step", wrong, World.step, {"wrenches": "forces"})

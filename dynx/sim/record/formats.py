@@ -57,10 +57,10 @@ def load(kind: type[Rollout], path: str | os.PathLike[str], model: Model | None 
     """Read a file of `save`: ``.npz`` to the last bit, or ``.mcap``, which has times in whole nanoseconds
     and neither scenario nor surroundings.
 
-    A ``.csv`` of `save`, or the log of a robot from elsewhere, is read as a rollout of `model`: its columns
-    are ``t`` and ``q:JOINT``, and where they are known ``v:JOINT``, ``a:JOINT`` and ``tau:JOINT``
-    (`dynx.sim.record.csv_file.load_csv`). The model of other files is read from the URDF text in them; no
-    array is unpickled.
+    A ``.csv`` of `save`, or the log of a robot from elsewhere, is read as a rollout of `model`. Its columns
+    are ``t`` and ``q:JOINT``, and, if they are known, ``v:JOINT``, ``a:JOINT`` and ``tau:JOINT``
+    (`dynx.sim.record.csv_file.load_csv`). The other formats contain the model, as URDF text. dynx unpickles
+    no array.
 
     Raises ArgumentError for any other file, NotInstalledError for ``.mcap`` without mcap.
     """

@@ -36,11 +36,11 @@ MARGIN = 0.01
 class Scene:
     """Everything that is in a world at the start, for every engine alike.
 
-    A part is named by its body, its robot, or ``robot/link``. `ignored` are pairs of names that do not
-    collide. A robot stands for all its links, and a name in `groups` for all its members. If both names of a
-    pair are the same, the parts of this name do not collide with one another. Gravity (3,) [m/s^2] is that of
-    the scene, not of the models. `sensors` are read by `World.read_sensors`. `notes` state how dynx read a
-    file that contains more than a scene can hold, such as one in MJCF.
+    The name of a part is the name of a body or a robot, or ``robot/link``. `ignored` are pairs of names of
+    parts that do not collide. The name of a robot stands for all its links, and a name in `groups` for all
+    its members. If both names of a pair are the same, its parts do not collide with one another. `gravity`
+    (3,) [m/s^2] replaces the gravity of the models. `World.read_sensors` reads the `sensors`. `notes` state
+    how dynx read a file that contains more than a scene can hold, such as a file in MJCF.
     """
 
     name: str = "scene"
