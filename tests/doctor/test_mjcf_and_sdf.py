@@ -58,6 +58,15 @@ WITHOUT_CAUSE = {
     </joint>
 """,
     "DX709": "link",
+    "DX720": """    <include>
+      <uri>model://dx720_holder</uri>
+      <pose>1 0 0 0 0 0</pose>
+    </include>
+    <joint name="mounting" type="fixed">
+      <parent>lower</parent>
+      <child>holder::tool::body</child>
+    </joint>
+""",
     "DX712": "<ixy>0.03125</ixy>",
     "DX719": "      <pose>0 0 0 0 1e-9 0</pose>\n",
 }
@@ -463,6 +472,37 @@ def test_the_sun_and_the_ground_of_gazebo_are_left_out_where_they_are_not_found(
     assert {each.rule for each in report.differences} == {"DX711"}
     with pytest.raises(DescriptionError, match="table"):
         dynx.load(text.replace("model://sun", "model://table"))
+
+
+@needs_all
+@pytest.mark.parametrize(
+    ("uri", "read_by_drake"),
+    [
+        ("arm", "model://arm/"),
+        ("arm/model.sdf", "model://arm/model.sdf"),
+        ("./arm/parts/hand.sdf", "model://arm/parts/hand.sdf"),
+        ("tool.sdf", "model://robots/tool.sdf"),
+        ("../tool.sdf", "model://{}/tool.sdf"),
+        ("../arm", "model://arm/"),
+    ],
+)
+def test_includes_by_a_path_are_written_as_drake_reads_them(
+    tmp_path: Path, uri: str, read_by_drake: str
+) -> None:
+    tool = '<sdf version="1.7"><model name="tool"><link name="body"/></model></sdf>'
+    (tmp_path / "package.xml").write_text("<package/>")
+    for folder in (tmp_path, tmp_path / "robots"):
+        (folder / "arm/parts").mkdir(parents=True)
+        (folder / "arm/model.config").write_text('<model><sdf version="1.7">model.sdf</sdf></model>')
+        for name in ("tool.sdf", "arm/model.sdf", "arm/parts/hand.sdf"):
+            (folder / name).write_text(tool)
+    path = tmp_path / "robots/robot.sdf"
+    path.write_text(trap_case("DX711").source.text.replace("model://dx711_tool", uri))
+    report = diagnose(path, base="floating", engines=["drake"], samples=1)
+    assert report.status == "explained", report.unexplained
+    assert [(each.rule, each.proved) for each in report.differences] == [("DX711", True)]
+    assert report.mended is not None
+    assert f"<uri>{read_by_drake.format(tmp_path.name)}</uri>" in report.mended
 
 
 def test_the_ground_of_gazebo_is_read_where_it_is_found(tmp_path: Path) -> None:

@@ -42,6 +42,10 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
     "DX618": {"DX619": "the base that is fixed floats in PyBullet"},
     "DX708": {"DX711": "what is included is named by a model"},
     "DX711": {"DX708": "a file is included"},
+    "DX720": {
+        "DX708": "a file is included",
+        "DX711": "what is included is named by a model",
+    },
     "DX715": {"DX701": "a link of a nested model is not looked at for a box"},
     "DX716": {"DX709": "PyBullet crashes on several roots"},
     "DX719": {"DX704": "the joint has a pose, and its axis is in the frame of the model"},

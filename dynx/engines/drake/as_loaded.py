@@ -92,7 +92,7 @@ by it is exact, and so small that its weight is below rounding."""
 
 def model_folders(path: Path) -> dict[str, Path]:
     """Return the folders of the models that a document in SDF includes as ``model://NAME``, and of those that
-    they include, by name.
+    they include, by name. A folder has a manifest, or the file that the URI names in it.
 
     Each is looked for around its document, also in folders ``models`` there, in no more folders than links
     lead to (`dynx.doctor.examination`).
@@ -101,11 +101,11 @@ def model_folders(path: Path) -> dict[str, Path]:
     waiting = [path]
     while waiting:
         document = waiting.pop()
-        for encoded in _MODEL_NAME.findall(read_file(str(document))):
-            name = encoded.decode(errors="replace")
+        for encoded in _MODEL_URI.findall(read_file(str(document))):
+            name, inside = (part.decode(errors="replace") for part in encoded)
             around = [] if name in found else document.parents[:_FOLDERS_ABOVE]
             for folder in (above / below / name for above in around for below in ("", "models")):
-                if (folder / MODEL_MANIFEST).is_file():
+                if (folder / MODEL_MANIFEST).is_file() or (inside and (folder / inside).is_file()):
                     found[name] = folder
                     waiting += sorted(folder.glob("*.sdf"))
                     break
@@ -115,7 +115,7 @@ def model_folders(path: Path) -> dict[str, Path]:
 _FOLDERS_ABOVE = 5
 """Number of folders, that of the document included, in which a model is looked for."""
 
-_MODEL_NAME = re.compile(rb"model://([^/<\s.][^/<\s]*)")
+_MODEL_URI = re.compile(rb"model://([^/<\s.][^/<\s]*)/?([^<\s]*)")
 
 
 def set_before_finalize(plant: Any, joints: Mapping[str, Any], path: Path, calls: Collection[str]) -> None:

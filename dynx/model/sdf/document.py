@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -51,6 +52,7 @@ _OF_WORLD = (
 _VERSION = re.compile(r"\s*([0-9]{1,3})\.([0-9]{1,3})(?:\.[0-9]+)?\s*")
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
 _FILES = (".sdf", ".world", ".xml", ".urdf")
+_BARE_NAME = re.compile(r"[^/\\:$]+")
 _REMOTE = re.compile("https?://|fuel://", re.IGNORECASE)
 
 
@@ -61,6 +63,10 @@ class SdfReading(FilesReading):
     unread: dict[tuple[str, str, str], tuple[Element, int, str]] = field(default_factory=dict)
     """First of the elements or attributes that are not used, their number and what it means, by the file, the
     element around and the name."""
+
+    includes_inside: list[tuple[int, int, str]] = field(default_factory=list)
+    """Each include of an included file: the line in the document that leads to it, its own line, which knows
+    its file, and its URI."""
 
     def one(self, parent: Element, tag: str, what: str) -> Element | None:
         """Return the element of that tag with its text as an attribute of that name, or None."""
@@ -206,12 +212,23 @@ def read_document(
     return _ScopeReader(reading, tuple(map(str, package_dirs))).read(root), reading
 
 
+def includes_of_included_files(data: str | bytes, source: str) -> list[tuple[int, int, str]]:
+    """Return the includes in files that a document in SDF includes: for each the line in the document that
+    leads to it, its own line, which knows its file (`file_of_line`), and its URI.
+
+    Raises the errors of `read_document`.
+    """
+    found = read_document(data, source, ())
+    return [] if found is None else found[1].includes_inside
+
+
 class _ScopeReader:
     """Reads scopes; `open_files` are those that are being included, in a row."""
 
     def __init__(self, reading: SdfReading, package_dirs: tuple[str, ...]) -> None:
         self._reading, self._package_dirs = reading, package_dirs
         self._open_files: list[str] = []
+        self._outer_line = 0
         self._roots: dict[str, Element] = {}
         self._sizes: dict[str, int] = {}
         self._elements = 0
@@ -221,7 +238,7 @@ class _ScopeReader:
     def read(self, root: Element) -> Scope:
         version = self._checked(root)
         reading = self._reading
-        worlds, models = root.all("world"), root.all("model")
+        worlds, models = root.all("world"), _models_of(root)
         if len(worlds) + len(models) > 1:
             second = (worlds + models)[1]
             raise reading.unsupported(
@@ -230,7 +247,7 @@ class _ScopeReader:
             )
         if not worlds and not models:
             raise reading.error(root, "<sdf> has neither a <model> nor a <world>; wanted one")
-        return self._scope((worlds + models)[0], None, version)
+        return self._scope(worlds[0], None, version) if worlds else self._model(models[0], None, version)
 
     def _checked(self, root: Element) -> Version:
         """Return the version of a document; raise an error for an element or attribute that it has not."""
@@ -320,11 +337,15 @@ class _ScopeReader:
         for child in element.children:
             if child.tag in ("link", "joint", "frame"):
                 self._add_part(scope, child)
-            elif child.tag == "model":
-                self._add_model(scope, self._scope(child, scope, version))
-            elif child.tag == "include" and not self._is_absent_scenery(child):
-                self._add_model(scope, self._included(child, scope))
+            elif child.tag == "model" or (child.tag == "include" and not self._is_absent_scenery(child)):
+                self._add_model(scope, self._model(child, scope, version))
         return scope
+
+    def _model(self, element: Element, parent: Scope | None, version: Version) -> Scope:
+        """Read a <model>, or the model that an <include> names."""
+        if element.tag == "include":
+            return self._included(element, parent)
+        return self._scope(element, parent, version)
 
     @staticmethod
     def _parents(scope: Scope) -> list[Scope]:
@@ -394,11 +415,15 @@ class _ScopeReader:
             return True
         return False
 
-    def _included(self, include: Element, scope: Scope) -> Scope:
+    def _included(self, include: Element, parent: Scope | None) -> Scope:
         reading = self._reading
         uri = reading.word(include, "uri", "an <include>")
         if uri is None:
             raise reading.error(include, "an <include> has no <uri>")
+        if not self._open_files:
+            self._outer_line = include.line
+        else:
+            reading.includes_inside.append((self._outer_line, include.line, uri))
         what = f"the model {shown(uri, 200)}"
         path = self._file_of(include, uri)
         if path in self._open_files:
@@ -416,13 +441,13 @@ class _ScopeReader:
         self._elements += self._sizes[path]  # Each time: a file may be included often.
         if self._elements > MAX_ELEMENTS:
             raise reading.error(include, f"the included files have more than {MAX_ELEMENTS} elements")
-        models = root.all("model")
+        models = _models_of(root)
         if len(models) != 1 or root.all("world"):
             raise reading.error(
                 include, f"{what} is a file of {len(models)} models; wanted one, and no world"
             )
         self._open_files.append(path)
-        found = self._scope(models[0], scope, self._version(root))
+        found = self._model(models[0], parent, self._version(root))
         self._open_files.pop()
         found.name = reading.word(include, "name", what) or found.name
         fault = name_fault(found.name)
@@ -447,7 +472,7 @@ class _ScopeReader:
     def _file_of(self, include: Element, uri: str) -> str:
         """Return the file that a URI names; a folder names it in its manifest."""
         if not uri.lower().endswith(_FILES):
-            folder = uri.rstrip("/")
+            folder = self._model_folder(include, uri.rstrip("/"))
             manifest = self._find(include, f"{folder}/{MODEL_MANIFEST}", uri)
             root = self._reading.read_included(manifest, with_text=("sdf",))
             files = sorted(
@@ -459,6 +484,16 @@ class _ScopeReader:
                 raise self._reading.error(root, f"names no <sdf> of a version up to 1.{NEWEST[1]}")
             uri = f"{folder}/{files[-1][1]}"
         return self._find(include, uri, uri)
+
+    def _model_folder(self, include: Element, folder: str) -> str:
+        """Return the URI of the folder of a model; a bare name that is no folder beside the file is searched
+        for as ``model://`` is, which Gazebo does."""
+        if _BARE_NAME.fullmatch(folder):
+            for uri in (folder, f"model://{folder}"):
+                with suppress(MeshNotFoundError):
+                    find_file(self._reading, include, f"{uri}/{MODEL_MANIFEST}", self._package_dirs)
+                    return uri
+        return folder
 
     @staticmethod
     def _version_of(entry: Element) -> Version:
@@ -500,6 +535,11 @@ def find_file(reading: SdfReading, element: Element, uri: str, package_dirs: Ite
     if found is None:
         raise MeshNotFoundError(reason_unknown(name, source))
     return str(found)
+
+
+def _models_of(root: Element) -> list[Element]:
+    """Return the models of a file: those in it, and those that it includes without a world around them."""
+    return [child for child in root.children if child.tag in ("model", "include")]
 
 
 def _walk(root: Element) -> Iterator[Element]:

@@ -19,7 +19,7 @@ _STATE = "the state of the file is not used"
 _VISUAL = "it belongs into a <visual>; the shape collides as without it"
 
 USED: dict[str, str] = {
-    "sdf": "model world",
+    "sdf": "model world include",
     "world": "model include frame joint gravity physics",
     "model": f"model include frame joint link pose static {NAME}",
     "include": "uri name pose static placement_frame",

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import posixpath
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
 from typing import ClassVar
 from xml.sax.saxutils import escape, quoteattr
 
-from dynx.errors import shown
+from dynx.errors import ModelError, shown
 from dynx.model.document_format import Format
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_above, find_mesh
 from dynx.model.package_search import MODEL_MANIFEST
-from dynx.model.sdf.document import scenery_of
+from dynx.model.sdf.document import includes_of_included_files, scenery_of
+from dynx.model.xml.several_files import file_of_line
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Remedy, Rule, measured_on
 from dynx.rules.geometry import file_of_mesh, is_found
@@ -444,49 +449,53 @@ def _shapes_of_one_name(case: Case, link: SourceElement) -> Iterator[Correction]
 
 
 class ModelsInOtherFolders(CallingRule):
-    """DX711 models-in-other-folders: The file includes a model by its name, which Drake does not search for.
+    """DX711 models-in-other-folders: The file includes a model by its name or by the path of a file, which
+    Drake does not search for.
 
-    ``model://arm`` means a folder ``arm``, or a folder whose ``model.config`` has this name. Gazebo searches
-    for the folder in ``GZ_SIM_RESOURCE_PATH``. dynx searches near the file and in ``package_dirs``.
+    ``model://arm`` and ``arm`` mean a folder ``arm``, or a folder whose ``model.config`` has this name.
+    Gazebo searches for the folder in ``GZ_SIM_RESOURCE_PATH``. dynx searches near the file and in
+    ``package_dirs``. ``arm/model.sdf`` and ``arm.sdf`` mean a file in the folder of the file that has the
+    include.
 
     - Drake 1.51 searches only in the ``package_map`` of its parser. If the folder is not there, it refuses
       the file ("Unable to find uri"). Otherwise it reads ``model://arm/`` and ``model://arm/model.sdf``, but
-      not ``model://arm``.
+      not ``model://arm``, ``arm``, ``arm/model.sdf`` and ``arm.sdf``.
     - PyBullet 3.2.7 (``loadSDF``) ignores ``<include>`` (DX708).
 
     Most worlds include ``model://sun`` and ``model://ground_plane``, which Gazebo brings along. dynx reads
     the file without them where they are not found.
 
-    What to do: end the URI with a slash, as ``dynx doctor --fix`` does. It removes the sun and the ground
-    where they are not found. Add each folder to the package map before Drake reads the file; the doctor
-    prints this call.
+    What to do: write the URI as ``model://arm/`` or ``model://arm/model.sdf``, as ``dynx doctor --fix`` does.
+    It removes the sun and the ground where they are not found. Add each folder to the package map before
+    Drake reads the file; the doctor prints this call.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
     trap_base = "floating"
-    advice = "End the URI with a slash, and add the folder to the package map of Drake's parser."
+    advice = "Write the URI as model://FOLDER/, and add the folder to the package map of Drake's parser."
     engines = measured_on("drake")
     calls = ("drake.add_models",)
-    changed = "added the folders of models to the package map and a slash to their names"
+    changed = "added the folders of models to the package map, and wrote their URIs as model://FOLDER/"
     per_joint = False
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Yield includes by the name of a model."""
+        """Yield includes by the name of a model or by a path."""
         for element in case.source.root.walk():
             uri = _uri(case, element)
-            if element.tag == "include" and (uri.startswith("model://") or scenery_of(uri)):
-                yield Detection(None, None, element.line, f"the file includes {_uri(case, element)}")
+            if element.tag == "include" and (uri.startswith("model://") or scenery_of(uri) or _is_path(uri)):
+                yield Detection(None, None, element.line, f"the file includes {uri}")
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """Return the case with the call, and with a slash after the name of each model."""
+        """Return the case with the call, and with the URIs that Drake reads."""
         every = [each for each in case.source.root.walk() if each.tag == "include"]
         absent = [each for each in every if _is_absent_scenery(case, _uri(case, each))]
         includes = [each for each in every if each not in absent]
-        uris = [each.first("uri") for each in includes if _MODEL.fullmatch(_uri(case, each))]
+        uris = [uri for each in includes if (uri := each.first("uri")) is not None]
+        new = [_uri_for_drake(case, case.source.text_in(uri)) for uri in uris]
         edits = [
-            case.source.replacement(uri, f"<uri>{case.source.text_in(uri)}/</uri>")
-            for uri in uris
-            if uri is not None
+            case.source.replacement(uri, f"<uri>{escape(text)}</uri>")
+            for uri, text in zip(uris, new, strict=True)
+            if text != case.source.text_in(uri)
         ] + [case.source.removal(each) for each in absent]
         called = case.with_source(case.source.apply(*edits)).with_calls(*self.calls)
         removed = "removed the sun and the ground of Gazebo, which were not found"
@@ -505,6 +514,72 @@ def _is_absent_scenery(case: Case, uri: str) -> bool:
 
 _MODEL = re.compile("model://[^/]+")
 """URI of a model without a path in its folder."""
+
+_SDF_FILES = (".sdf", ".world", ".xml")
+
+
+def _is_path(uri: str) -> bool:
+    """Check whether a URI is the bare name of a model, or a path that is not absolute."""
+    return bool(uri) and "://" not in uri and not uri.startswith("/")
+
+
+def _is_unread_by_drake(uri: str) -> bool:
+    """Check whether Drake does not read a URI, whatever the package map has."""
+    return bool(_MODEL.fullmatch(uri)) or _is_path(uri)
+
+
+def _uri_for_drake(case: Case, uri: str) -> str:
+    """Return the URI of the same model that Drake reads with the folders of models in its package map."""
+    if _MODEL.fullmatch(uri):
+        return f"{uri}/"
+    if not _is_path(uri):
+        return uri
+    parts = posixpath.normpath(uri).split("/")
+    above = parts.count("..")
+    inside = "/".join(parts[above:])
+    if "/" in inside:
+        return f"model://{inside}"
+    if not inside.lower().endswith(_SDF_FILES):
+        return f"model://{inside}/"
+    # A file that lies in no folder of its own: in the folder of the document, or in one above it.
+    folders = Path(os.path.realpath(case.source.source)).parents
+    return f"model://{folders[above].name}/{inside}" if above < len(folders) else uri
+
+
+class IncludesOfIncludedFiles(Rule):
+    """DX720 includes-of-included-files: A file that the file includes has an include, which Drake does not
+    search for.
+
+    Models of drones consist of files that include one another. For example ``x500_depth`` includes ``x500``,
+    and ``x500`` includes ``x500_base``.
+
+    - Drake 1.51 refuses the file ("Unable to find uri") if an included file names a model as
+      ``model://arm``, ``arm``, ``arm/model.sdf`` or ``arm.sdf``, whatever the package map of its parser has
+      (DX711).
+    - PyBullet 3.2.7 (``loadSDF``) ignores ``<include>`` (DX708).
+
+    What to do: write one file with all links (``dynx convert --to sdf``). Or write the URIs in the included
+    files as ``model://arm/`` (DX711). ``dynx doctor --fix`` does not change included files.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    stated = True
+    stated_refusal = True
+    advice = "Write one file with all links (dynx convert --to sdf)."
+    engines = measured_on("drake")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield includes of included files with URIs that Drake does not read."""
+        if not any(each.tag == "include" for each in case.source.root.walk()):
+            return
+        with suppress(ModelError):
+            text, source = case.source.text_with_lines_before, case.source.source
+            for line, inner, uri in includes_of_included_files(text, source):
+                if _is_unread_by_drake(uri):
+                    file = "/".join(Path(file_of_line(inner) or "").parts[-2:])
+                    found = f"the included file {file}, line {inner}, includes {uri}"
+                    yield Detection(None, None, line, found)
 
 
 class ProductsOfInertiaOfSdf(Rule):

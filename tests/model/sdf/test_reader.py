@@ -281,6 +281,44 @@ def test_included_models(tmp_path: Path, uri: str, monkeypatch: pytest.MonkeyPat
         assert dynx.load(elsewhere / "robot.sdf").nv == 1
 
 
+def test_a_bare_name_is_searched_for_as_the_name_of_a_model(tmp_path: Path) -> None:
+    """A folder beside the file comes first, then the models of the repository and of the environment."""
+    included(tmp_path)
+    inner = tmp_path / "robots/arm"
+    inner.mkdir(parents=True)
+    path = included(inner, INCLUDE.format("", "part/", "one::"))
+    (inner / "package.xml").unlink()
+    (inner / "part/model.sdf").unlink()
+    with pytest.raises(DescriptionError, match=r"no file 'part/model.sdf'"):
+        dynx.load(path)
+    (inner / "part/model.config").unlink()
+    (inner / "part").rmdir()
+    assert dynx.load(path).joint("j").child == "one::a"
+    path.write_text(path.read_text().replace("part/", "prt"))
+    with pytest.raises(DescriptionError, match=r"'prt' is not included: no file 'prt/model.config'"):
+        dynx.load(path)
+
+
+def test_a_file_that_is_one_include_is_the_model_that_it_includes(tmp_path: Path) -> None:
+    included(tmp_path)
+    place = "<name>one</name><pose>1 0 0 0 0 0</pose>"
+    path = tmp_path / "whole.sdf"
+    path.write_text(f'<sdf version="1.9"><include><uri>model://part</uri>{place}</include></sdf>')
+    model = dynx.load(path)
+    assert (model.name, model.nv) == ("one", 6)
+    assert any("'a' is placed at 1 0 0.5" in each.message for each in model.notes)
+    require_close(pose_of(model, "tip", model.neutral().tolist())[:3, 3], np.array([0.0, 0.0, 1.0]))
+    extra = INCLUDE.format("", "whole.sdf", "one::").replace("<pose>1 0 0 0 0 0</pose>", "")
+    outer = dynx.load(included(tmp_path, extra, whole=path.read_text()))
+    require_close(pose_of(outer, "one::tip", [0.0])[:3, 3], np.array([1.0, 0.0, 1.5]))
+    more = '<model name="m"><link name="l"/></model>'
+    path.write_text(path.read_text().replace("</include>", f"</include>{more}"))
+    with pytest.raises(UnsupportedFeatureError, match="0 worlds and 2 models"):
+        dynx.load(path)
+    with pytest.raises(DescriptionError, match="a file of 2 models; wanted one"):
+        dynx.load(included(tmp_path, extra))
+
+
 def test_a_placement_frame_is_what_the_pose_places(tmp_path: Path) -> None:
     extra = INCLUDE.format("", "part", "one::").replace(
         "</pose>", "</pose><placement_frame>tip</placement_frame>"
