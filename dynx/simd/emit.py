@@ -476,7 +476,7 @@ class SegmentBody:
                 self._stored_columns += store_column(number, lanes, *values)
             else:
                 self._rows[number].store_tile(columns.start, values)
-            self._pass(STORE_OPERATIONS)
+            self._pass(STORE_OPERATIONS * len(columns))
 
     def _pointers(self, port: int) -> list[str]:
         """Return the row pointers of one array, one per lane, which the head of the function computes."""

@@ -2,8 +2,9 @@
 
 A vector holds the same scalar of several samples, one per lane, but in memory the scalars of one sample are
 contiguous. Tiles of b by b numbers, b rows of b neighbouring columns, are therefore loaded row by row and
-transposed in registers by shuffles; stores do the reverse. The numbers of a single column are one vector
-where they are neighbours too, which the code finds out when it runs.
+transposed in registers by shuffles; stores do the reverse. Vectors of 8 numbers are transposed whole, and
+stored in tiles of 8 columns, so that a store writes as much as a cache line. The numbers of a single column
+are one vector where they are neighbours too, which the code finds out when it runs.
 
 Code that is not optimised has its inputs, constants, results and spilled values in a scratch memory, a vector
 each. LLVM selects the instructions of such code three times as fast if they are loads, stores and arithmetic
@@ -22,6 +23,15 @@ from itertools import pairwise
 from dynx.simd.ir_writer import Writer, hex_double
 from dynx.simd.program import Port, Program, scalar_ranges
 
+WIDE = 8
+"""Number of lanes of the widest vectors, and number of columns of the tiles that they store."""
+
+LANES_OF_ROWS = (0, 2), (4, 6), (1, 3), (5, 7)
+"""The two lanes whose numbers of four columns share a vector when a tile of `WIDE` lanes is transposed."""
+
+EVEN, ODD = (0, 8, 2, 10, 4, 12, 6, 14), (1, 9, 3, 11, 5, 13, 7, 15)
+"""Entries of two vectors that alternate, of the even and of the odd lanes."""
+
 
 def tile_width(columns: int, lanes: int) -> int:
     """Return the number of columns loaded at once: the largest power of two <= 4, columns, lanes."""
@@ -37,13 +47,15 @@ def tile_start(column: int, columns: int, width: int) -> int:
 
 
 def tiles(columns: int, lanes: int) -> list[range]:
-    """Return the columns of every tile of a row."""
+    """Return the columns of every tile that is stored; the last may overlap the one before."""
     if columns == 0:
         return []
-    width = tile_width(columns, lanes)
-    return [
-        range(start, start + width) for start in sorted({*range(0, columns - width, width), columns - width})
-    ]
+    narrow = tile_width(columns, lanes)
+    width = WIDE if lanes == WIDE <= columns else narrow
+    found = [range(start, start + width) for start in range(0, columns - width + 1, width)]
+    if rest := columns % width:
+        found.append(range(columns - (narrow if rest <= narrow else width), columns))
+    return found
 
 
 def lane_names(number: int, lanes: int) -> list[str]:
@@ -155,7 +167,10 @@ class Rows:
 
     def store_tile(self, start: int | str, columns: Sequence[str]) -> None:
         """Write the vectors of all columns of the tile from a column, given as a number or by its name."""
-        write, width = self._write, self._width
+        write, width = self._write, len(columns)
+        if write.lanes == WIDE and width >= WIDE // 2:
+            self._store_wide_tile(start, columns)
+            return
         for first in range(0, write.lanes, width):
             lanes = list(range(first, first + width))
             parts = list(columns)
@@ -167,6 +182,8 @@ class Rows:
     def load_tile(self, start: int | str) -> list[str]:
         """Return the vectors of all columns of the tile from a column, given as a number or by its name."""
         write, width = self._write, self._width
+        if write.lanes == WIDE and width == WIDE // 2:
+            return self._load_wide_tile(start)
         groups = []
         for first in range(0, write.lanes, width):
             rows = [
@@ -182,11 +199,43 @@ class Rows:
             ]
         return groups[0]
 
+    def _store_wide_tile(self, start: int | str, columns: Sequence[str]) -> None:
+        write, width = self._write, len(columns)
+        fours = [_rows_of_four(write, columns[k : k + 4]) for k in range(0, width, 4)]
+        for lanes, parts in zip(LANES_OF_ROWS, zip(*fours, strict=True), strict=True):
+            left, right = parts[0], parts[1] if width == WIDE else "poison"
+            for half, lane in zip((range(4), range(4, 8)), lanes, strict=True):
+                picks = [*half, *(WIDE + k for k in half)]
+                row = write.shuffle(left, right, picks[:width], WIDE)
+                write.do(f"store <{width} x double> {row}, ptr {self._at(lane, start)}, align 8")
+
+    def _load_wide_tile(self, start: int | str) -> list[str]:
+        write = self._write
+        rows = [write.let(f"load <4 x double>, ptr {self._at(lane, start)}, align 8") for lane in range(WIDE)]
+        both = [write.shuffle(rows[a], rows[b], range(WIDE), WIDE // 2) for a, b in LANES_OF_ROWS]
+        found = []
+        for pairs in ((0, 1, 4, 5, 8, 9, 12, 13), (2, 3, 6, 7, 10, 11, 14, 15)):
+            even, odd = (write.shuffle(both[k], both[k + 1], pairs, WIDE) for k in (0, 2))
+            found += [write.shuffle(even, odd, picks, WIDE) for picks in (EVEN, ODD)]
+        return found
+
     def _at(self, lane: int, column: int | str) -> str:
         row = self._pointers()[lane]
         return (
             row if column == 0 else self._write.let(f"getelementptr inbounds double, ptr {row}, i64 {column}")
         )
+
+
+def _rows_of_four(write: Writer, columns: Sequence[str]) -> list[str]:
+    """Return the rows of four columns of `WIDE` lanes, two in a vector, in the order of `LANES_OF_ROWS`."""
+    a, b, c, d = columns
+    found = []
+    for picks in (EVEN, ODD):
+        left, right = write.shuffle(a, b, picks, WIDE), write.shuffle(c, d, picks, WIDE)
+        for k in (0, 4):
+            pairs = (k, k + 1, k + 8, k + 9, k + 2, k + 3, k + 10, k + 11)
+            found.append(write.shuffle(left, right, pairs, WIDE))
+    return found
 
 
 def _transpose(write: Writer, rows: Sequence[str]) -> list[str]:

@@ -26,8 +26,8 @@ MAX_STORES = 24
 compile as thousands of operations."""
 
 
-STORE_OPERATIONS = 12
-"""Approximate number of operations of the store of a tile."""
+STORE_OPERATIONS = 3
+"""Approximate number of operations of the store of a column."""
 
 
 MAX_ANGLES = 24
@@ -148,7 +148,7 @@ def spill_slots(program: Program, segments: Sequence[Segment]) -> dict[int, int]
 def segment_operations(program: Program, segment: Segment) -> int:
     """Return the approximate number of operations of a segment with its stores, without sines and cosines."""
     steps = sum(operation_count(program, step) for step in segment.steps if isinstance(step, int))
-    return steps + STORE_OPERATIONS * len(segment.stores)
+    return steps + STORE_OPERATIONS * sum(len(store.columns) for store in segment.stores)
 
 
 def operation_count(program: Program, step: Step) -> int:
