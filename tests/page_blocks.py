@@ -417,10 +417,13 @@ def main() -> int:
         os.environ["DYNX_CACHE_DIR"] = cache_folder.name
     right = 0
     with ThreadPoolExecutor(given.jobs) as pool:
-        for ended in as_completed([pool.submit(run, block, small=given.small) for block in blocks]):
-            outcome = ended.result()
-            right += not outcome.fault
-            print(f"{outcome.block}: {outcome.seconds:.1f} s {outcome.fault}".rstrip(), flush=True)
+        try:
+            for ended in as_completed([pool.submit(run, block, small=given.small) for block in blocks]):
+                outcome = ended.result()
+                right += not outcome.fault
+                print(f"{outcome.block}: {outcome.seconds:.1f} s {outcome.fault}".rstrip(), flush=True)
+        finally:
+            pool.shutdown(cancel_futures=True)  # Ctrl-C begins no further block
     print(f"{len(blocks)} blocks, {right} right alone")
     return int(right < len(blocks))
 
