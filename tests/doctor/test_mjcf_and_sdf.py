@@ -475,6 +475,25 @@ def test_the_sun_and_the_ground_of_gazebo_are_left_out_where_they_are_not_found(
 
 
 @needs_all
+def test_undefined_elements_of_included_files_are_named(tmp_path: Path) -> None:
+    sensor = '<sensor name="imu" type="imu"><gz_frame_id>body</gz_frame_id></sensor>'
+    tool = f'<model name="tool"><link name="body">\n{sensor}</link></model>'
+    (tmp_path / "arm").mkdir()
+    (tmp_path / "arm/model.sdf").write_text(f'<sdf version="1.7">{tool}</sdf>')
+    path = tmp_path / "robot.sdf"
+    path.write_text(trap_case("DX711").source.text.replace("model://dx711_tool", "model://arm/model.sdf"))
+    report = diagnose(path, base="floating", engines=["drake"], samples=1)
+    assert report.status == "explained", report.unexplained
+    found = [each for each in report.differences if each.rule == "DX720"]
+    assert [each.message for each in found] == [
+        "in the included file arm/model.sdf, line 2, SDF has no <gz_frame_id> in <sensor>"
+    ]
+    (tmp_path / "arm/model.sdf").write_text(f'<sdf version="1.7">{tool.replace(sensor, "")}</sdf>')
+    report = diagnose(path, base="floating", engines=["drake"], samples=1)
+    assert {each.rule for each in report.differences} == {"DX711"}
+
+
+@needs_all
 @pytest.mark.parametrize(
     ("uri", "read_by_drake"),
     [

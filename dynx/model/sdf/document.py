@@ -64,9 +64,8 @@ class SdfReading(FilesReading):
     """First of the elements or attributes that are not used, their number and what it means, by the file, the
     element around and the name."""
 
-    includes_inside: list[tuple[int, int, str]] = field(default_factory=list)
-    """Each include of an included file: the line in the document that leads to it, its own line, which knows
-    its file, and its URI."""
+    included_files: dict[str, int] = field(default_factory=dict)
+    """Line in the document that leads to an included file, the first of them, by the path of the file."""
 
     def one(self, parent: Element, tag: str, what: str) -> Element | None:
         """Return the element of that tag with its text as an attribute of that name, or None."""
@@ -197,6 +196,12 @@ def is_reserved(name: str) -> bool:
     return name == WORLD or (name.startswith("__") and name.endswith("__"))
 
 
+def version_of(text: str) -> Version:
+    """Return the version of SDF that a text states; (0, 0) for another text."""
+    found = _VERSION.fullmatch(text)
+    return (int(found[1]), int(found[2])) if found else (0, 0)
+
+
 def read_document(
     data: str | bytes, source: str, package_dirs: Iterable[StrPath]
 ) -> tuple[Scope, SdfReading] | None:
@@ -212,14 +217,11 @@ def read_document(
     return _ScopeReader(reading, tuple(map(str, package_dirs))).read(root), reading
 
 
-def includes_of_included_files(data: str | bytes, source: str) -> list[tuple[int, int, str]]:
-    """Return the includes in files that a document in SDF includes: for each the line in the document that
-    leads to it, its own line, which knows its file (`file_of_line`), and its URI.
-
-    Raises the errors of `read_document`.
-    """
+def included_files(data: str | bytes, source: str) -> dict[str, int]:
+    """Return the paths of the files that a document in SDF includes, also of those that these include, each
+    with the first line in the document that leads to it. Raises the errors of `read_document`."""
     found = read_document(data, source, ())
-    return [] if found is None else found[1].includes_inside
+    return {} if found is None else found[1].included_files
 
 
 class _ScopeReader:
@@ -253,8 +255,7 @@ class _ScopeReader:
         """Return the version of a document; raise an error for an element or attribute that it has not."""
         reading = self._reading
         text = reading.attribute(root, "version", "the file")
-        found = _VERSION.fullmatch(text)
-        version = (int(found[1]), int(found[2])) if found else (0, 0)
+        version = version_of(text)
         if not OLDEST <= version <= NEWEST:
             raise reading.unsupported(
                 root, f"the version of SDF is {shown(text)}; dynx reads 1.{OLDEST[1]} to 1.{NEWEST[1]}"
@@ -279,6 +280,11 @@ class _ScopeReader:
         if element.tag == "pose" and "frame" in element.attributes:
             raise self._reading.error(element, "frame of <pose> is called relative_to since version 1.7")
         for child in element.all("use_parent_model_frame"):
+            axes = element.all("xyz")
+            if child.text.strip() in _FALSE or (axes and "expressed_in" in axes[0].attributes):
+                effect = "it is no element since version 1.7, and programs ignore it"
+                self._reading.leave_unread(child, element.tag, "<use_parent_model_frame>", effect)
+                continue
             raise self._reading.error(
                 child,
                 f"<use_parent_model_frame> of <{element.tag}> is no element since version 1.7; "
@@ -420,12 +426,11 @@ class _ScopeReader:
         uri = reading.word(include, "uri", "an <include>")
         if uri is None:
             raise reading.error(include, "an <include> has no <uri>")
-        if not self._open_files:
-            self._outer_line = include.line
-        else:
-            reading.includes_inside.append((self._outer_line, include.line, uri))
         what = f"the model {shown(uri, 200)}"
         path = self._file_of(include, uri)
+        if not self._open_files:
+            self._outer_line = include.line
+        reading.included_files.setdefault(path, self._outer_line)
         if path in self._open_files:
             raise reading.error(include, f"{what} includes itself")
         reading.count_included(include, len(self._open_files))
@@ -478,7 +483,7 @@ class _ScopeReader:
             files = sorted(
                 (found, each.text.strip())
                 for each in root.all("sdf")
-                if (found := self._version_of(each)) <= NEWEST
+                if (found := version_of(each.attributes.get("version", ""))) <= NEWEST
             )
             if not files:
                 raise self._reading.error(root, f"names no <sdf> of a version up to 1.{NEWEST[1]}")
@@ -494,11 +499,6 @@ class _ScopeReader:
                     find_file(self._reading, include, f"{uri}/{MODEL_MANIFEST}", self._package_dirs)
                     return uri
         return folder
-
-    @staticmethod
-    def _version_of(entry: Element) -> Version:
-        found = _VERSION.fullmatch(entry.attributes.get("version", ""))
-        return (int(found[1]), int(found[2])) if found else (0, 0)
 
     def _find(self, include: Element, name: str, uri: str) -> str:
         try:

@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import ClassVar
 from xml.sax.saxutils import escape, quoteattr
 
-from dynx.errors import ModelError, shown
+from dynx.errors import ModelError, escaped, shown
+from dynx.files.reading import read_file
 from dynx.model.document_format import Format
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_above, find_mesh
 from dynx.model.package_search import MODEL_MANIFEST
-from dynx.model.sdf.document import includes_of_included_files, scenery_of
-from dynx.model.xml.several_files import file_of_line
+from dynx.model.sdf.document import included_files, scenery_of, version_of
+from dynx.model.sdf.vocabulary import is_undefined
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Remedy, Rule, measured_on
 from dynx.rules.geometry import file_of_mesh, is_found
@@ -546,20 +547,20 @@ def _uri_for_drake(case: Case, uri: str) -> str:
     return f"model://{folders[above].name}/{inside}" if above < len(folders) else uri
 
 
-class IncludesOfIncludedFiles(Rule):
-    """DX720 includes-of-included-files: A file that the file includes has an include, which Drake does not
-    search for.
+class FaultsOfIncludedFiles(Rule):
+    """DX720 faults-of-included-files: A file that the file includes has a part that Drake refuses.
 
     Models of drones consist of files that include one another. For example ``x500_depth`` includes ``x500``,
     and ``x500`` includes ``x500_base``.
 
     - Drake 1.51 refuses the file ("Unable to find uri") if an included file names a model as
       ``model://arm``, ``arm``, ``arm/model.sdf`` or ``arm.sdf``, whatever the package map of its parser has
-      (DX711).
+      (DX711). Drake also refuses the file if an included file has an element that SDF does not define
+      (DX721).
     - PyBullet 3.2.7 (``loadSDF``) ignores ``<include>`` (DX708).
 
-    What to do: write one file with all links (``dynx convert --to sdf``). Or write the URIs in the included
-    files as ``model://arm/`` (DX711). ``dynx doctor --fix`` does not change included files.
+    What to do: write one file with all links (``dynx convert --to sdf``). Or examine each included file by
+    ``dynx doctor``. ``dynx doctor --fix`` does not change included files.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("sdf",)
@@ -570,16 +571,27 @@ class IncludesOfIncludedFiles(Rule):
     engines = measured_on("drake")
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Yield includes of included files with URIs that Drake does not read."""
+        """Yield the parts of included files that Drake does not read."""
         if not any(each.tag == "include" for each in case.source.root.walk()):
             return
         with suppress(ModelError):
             text, source = case.source.text_with_lines_before, case.source.source
-            for line, inner, uri in includes_of_included_files(text, source):
-                if _is_unread_by_drake(uri):
-                    file = "/".join(Path(file_of_line(inner) or "").parts[-2:])
-                    found = f"the included file {file}, line {inner}, includes {uri}"
+            for path, line in included_files(text, source).items():
+                included = XmlSource(read_file(path), path)
+                file = "/".join(Path(path).parts[-2:])
+                for inner, fault in _faults_in(included):
+                    found = f"in the included file {file}, line {inner}, {fault}"
                     yield Detection(None, None, line, found)
+
+
+def _faults_in(source: XmlSource) -> Iterator[tuple[int, str]]:
+    """Yield the line and the description of each part of a file that Drake does not read."""
+    for element in source.root.walk():
+        uri = element.first("uri") if element.tag == "include" else None
+        if uri is not None and _is_unread_by_drake(source.text_in(uri)):
+            yield element.line, f"the file includes {source.text_in(uri)}"
+    for element in _undefined_elements(source):
+        yield element.line, _described(element)
 
 
 class ProductsOfInertiaOfSdf(Rule):
@@ -889,3 +901,55 @@ class MeshInOtherFolder(Rule):
                     file, source = file_of_mesh(case.source, mesh), case.source.source
                     if is_found(file, source) and find_above(file, source) is None:
                         yield _found(link, mesh, f"PyBullet does not find {shown(file, 200)}")
+
+
+class UndefinedElementOfSdf(EditingRule):
+    """DX721 undefined-element-of-sdf: The file has an element that SDF does not define, which Drake refuses.
+
+    Examples are ``<gz_frame_id>`` in a sensor, which Gazebo reads, and ``<material>`` in a collision. A name
+    with a prefix, such as ``gz:frame``, is allowed, and so is everything in a ``<plugin>``.
+
+    - Drake 1.51 refuses the file ("not defined in SDF").
+    - Gazebo prints a warning. PyBullet 3.2.7 (``loadSDF``) ignores the element without a message.
+
+    dynx refuses such an element where it describes the robot, because it may be misspelt. Elsewhere, as in
+    sensors and surfaces, dynx ignores it as it ignores the elements around it.
+
+    What to do: remove the element, as ``dynx doctor --fix`` does. If another program reads it, keep it in a
+    file of its own for that program.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    advice = "Remove the element."
+    engines = measured_on("drake")
+    changed = "removed elements that SDF does not define"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the outermost elements that SDF does not define, in document order."""
+        for element in _undefined_elements(case.source):
+            part = element.parent
+            while part is not None and part.tag not in ("link", "joint"):
+                part = part.parent
+            message = _described(element)
+            found = Detection(None, None, element.line, message)
+            yield Correction(
+                found if part is None else _found(part, element, message), (case.source.removal(element),)
+            )
+
+
+def _undefined_elements(source: XmlSource) -> Iterator[SourceElement]:
+    """Yield the outermost elements that SDF does not define, in document order."""
+    version = version_of(source.root.attributes.get("version", ""))
+    waiting = [source.root]
+    while waiting:
+        element = waiting.pop()
+        if element.parent is not None and is_undefined(element.parent.tag, element.tag, version):
+            yield element
+        elif element.tag != "plugin":
+            waiting += reversed(element.children)
+
+
+def _described(undefined: SourceElement) -> str:
+    around = "sdf" if undefined.parent is None else undefined.parent.tag
+    return f"SDF has no <{escaped(undefined.tag)}> in <{around}>"

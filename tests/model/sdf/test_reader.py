@@ -11,7 +11,7 @@ from hypothesis import given
 import dynx
 from dynx.errors import ArgumentError, DescriptionError, UnsupportedFeatureError
 from dynx.model.geometry import Box, Capsule, Ellipsoid, Mesh, Plane, Sphere
-from dynx.model.sdf.vocabulary import ATTRIBUTES, CLOSED, NOT_USED, USED
+from dynx.model.sdf.vocabulary import ATTRIBUTES, CLOSED, NOT_USED, USED, is_undefined
 from dynx.model.xml.reading import Element, read_xml
 from dynx.spatial.scalar import Floats
 from tests.model.sdf.models import models, old_models
@@ -664,6 +664,49 @@ FAULTS = {
         "7: damping in <dynamics> of joint 'hinge' is 'x'",
     ),
 }
+
+
+@pytest.mark.parametrize(
+    "axis",
+    [
+        f"{XYZ}<use_parent_model_frame>false</use_parent_model_frame>",
+        '<xyz expressed_in="__model__">1 0 0</xyz><use_parent_model_frame>1</use_parent_model_frame>',
+    ],
+)
+def test_a_former_element_that_states_nothing_else_is_ignored(axis: str) -> None:
+    model = dynx.load(ARM.replace(XYZ, axis))
+    plain = dynx.load(ARM.replace(XYZ, axis[: axis.index("<use")]))
+    assert np.array_equal(model.joint("hinge").axis, plain.joint("hinge").axis)
+    assert any("no element since version 1.7" in each.message for each in model.notes)
+
+
+@pytest.mark.parametrize(
+    ("around", "name", "version", "expected"),
+    [
+        ("sensor", "gz_frame_id", (1, 9), True),
+        ("sensor", "imu", (1, 9), False),
+        ("sensor", "gz:frame", (1, 9), False),
+        ("sensor", "plugin", (1, 4), False),
+        ("sensor", "frame", (1, 6), False),
+        ("sensor", "frame", (1, 7), True),
+        ("model", "frame", (1, 7), False),
+        ("collision", "material", (1, 6), True),
+        ("visual", "material", (1, 6), False),
+        ("axis", "use_parent_model_frame", (1, 6), False),
+        ("axis", "use_parent_model_frame", (1, 9), True),
+        ("always_on", "anything", (1, 9), False),
+    ],
+)
+def test_elements_that_sdf_does_not_define(
+    around: str, name: str, version: tuple[int, int], expected: bool
+) -> None:
+    assert is_undefined(around, name, version) == expected
+
+
+def test_elements_that_are_not_read_are_defined_but_for_those_of_pybullet() -> None:
+    read = [(around, name) for around, names in NOT_USED.items() for name in names]
+    undefined = {around for around, name in read if is_undefined(around, name, (1, 6))}
+    assert undefined == {"link", "collision"}
 
 
 @pytest.mark.parametrize("fault", FAULTS)
