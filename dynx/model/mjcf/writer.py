@@ -534,7 +534,11 @@ class RobotWriter:
         else:
             given |= primitive_attributes(shape)
         if isinstance(shape, Plane) and (self._tree.floating or link.name != self._tree.root):
-            _add(self._kinds, "MuJoCo accepts planes on bodies that do not move alone", link.name)
+            _add(
+                self._kinds,
+                "MuJoCo accepts planes only on bodies that do not move, and refuses the document",
+                link.name,
+            )
         if isinstance(placed, Visual) and placed.material is not None:
             given |= self._assets.material(placed.material, what)
         return SubElement(body, "geom", given | _pose_attributes(placed.origin) | dict(bits or {}))

@@ -32,6 +32,7 @@ from dynx.model.geometry.solids import (
     inertial_of,
     solid_properties,
 )
+from dynx.model.geometry.stated_mesh import StatedMesh
 from dynx.model.sdf.document import NamedPart, SdfReading, find_file
 from dynx.model.sdf.frames import Frames
 from dynx.model.sdf.vocabulary import USED
@@ -128,7 +129,8 @@ class LinkShapeReader:
         if shape is None:
             return None
         try:
-            found, placement = self._shape(shape, what)
+            sheet = self._sheet(shape, link, what) if element.tag == "visual" else None
+            found, placement = sheet or self._shape(shape, what)
         except ArgumentError as error:
             return self._reading.error(shape, f"{what}: {error}")
         except DescriptionError as error:
@@ -161,14 +163,36 @@ class LinkShapeReader:
         if tag == "ellipsoid":
             return Ellipsoid(self._vector(element, "radii", what, 1.0)), np.eye(4)
         if tag == "plane":
-            normal = np.array(self._vector(element, "normal", what, 0.0, 0.0, 1.0))
-            length = float(np.linalg.norm(normal))
-            if length < 1e-14:
-                raise reading.error(element, f"the normal of {what} is zero; wanted a direction")
-            return Plane(), homogeneous(rotation_of_z(normal / length), np.zeros(3))
+            for size in element.all("size"):
+                reading.leave_unread(size, tag, "<size>", "a plane has no end")
+            return Plane(), self._turned_to_normal(element, what)
         if tag == "mesh":
             return self._mesh(element, what), np.eye(4)
         raise reading.unsupported(element, f"{what} is <{tag}>, which is no shape of dynx")
+
+    def _sheet(self, shape: Element, link: NamedPart, what: str) -> tuple[Shape, Floats] | None:
+        """Return a visual plane with an end, such as a label, as the two triangles that Gazebo draws, and its
+        pose (4, 4); None for another shape, and for a plane of a link that also collides as a plane."""
+        size = self._reading.one(shape, "size", what) if shape.tag == "plane" else None
+        collisions = (self._reading.only(each, "geometry") for each in link.element.all("collision"))
+        if size is None or any(each is not None and each.all("plane") for each in collisions):
+            return None
+        x, y = (0.5 * length for length in self._reading.numbers(size, "size", what, 2))
+        if min(x, y) <= 0.0:
+            raise self._reading.error(
+                shape, f"size of {what} is {2 * x:g} {2 * y:g}; wanted positive numbers"
+            )
+        points = ((-x, -y, 0.0), (x, -y, 0.0), (x, y, 0.0), (-x, y, 0.0))
+        sheet = StatedMesh(points=points, corners=((0, 1, 2), (0, 2, 3)), label="plane")
+        return sheet, self._turned_to_normal(shape, what)
+
+    def _turned_to_normal(self, plane: Element, what: str) -> Floats:
+        """Return the pose (4, 4) whose z axis is the normal of a plane."""
+        normal = np.array(self._vector(plane, "normal", what, 0.0, 0.0, 1.0))
+        length = float(np.linalg.norm(normal))
+        if length < 1e-14:
+            raise self._reading.error(plane, f"the normal of {what} is zero; wanted a direction")
+        return homogeneous(rotation_of_z(normal / length), np.zeros(3))
 
     def _mesh(self, element: Element, what: str) -> Mesh:
         reading = self._reading

@@ -36,7 +36,7 @@ USED: dict[str, str] = {
     "capsule": "radius length",
     "cone": "radius length",
     "ellipsoid": "radii",
-    "plane": "normal",
+    "plane": "normal size",
     "mesh": "uri scale submesh",
     "material": "diffuse",
     "joint": f"pose parent child axis axis2 {NAME} {HOLD} {LOCKED} {ROTOR_INERTIA} {GEAR_RATIO}",
@@ -109,7 +109,6 @@ NOT_USED: dict[str, dict[str, str]] = {
         "meta": _NONE,
         "visibility_flags": _NONE,
     },
-    "plane": {"size": "a plane has no end"},
     "mesh": {"convex_decomposition": "a mesh collides as its convex hull"},
     "material": dict.fromkeys(
         (

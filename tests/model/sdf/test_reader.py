@@ -11,6 +11,7 @@ from hypothesis import given
 import dynx
 from dynx.errors import ArgumentError, DescriptionError, UnsupportedFeatureError
 from dynx.model.geometry import Box, Capsule, Ellipsoid, Mesh, Plane, Sphere
+from dynx.model.geometry.stated_mesh import StatedMesh
 from dynx.model.sdf.vocabulary import ATTRIBUTES, CLOSED, NOT_USED, USED, is_undefined
 from dynx.model.xml.reading import Element, read_xml
 from dynx.spatial.scalar import Floats
@@ -664,6 +665,38 @@ FAULTS = {
         "7: damping in <dynamics> of joint 'hinge' is 'x'",
     ),
 }
+
+
+LABEL = """<sdf version="1.9"><model name="m"><link name="l">
+<visual name="v"><geometry><plane>{}</plane></geometry></visual>
+<collision name="c"><geometry>{}</geometry></collision></link></model></sdf>"""
+
+
+def test_a_visual_plane_with_a_size_is_the_rectangle_that_gazebo_draws() -> None:
+    size = "<normal>1 0 0</normal><size>0.5 0.25</size>"
+    model = dynx.load(LABEL.format(size, "<box><size>1 1 1</size></box>"))
+    (visual,) = model.geometry.visuals("l")
+    assert isinstance(visual.shape, StatedMesh)
+    assert not any("size" in each.message for each in model.notes)
+    points, corners = visual.shape.triangles
+    edges = points[corners[:, 1:]] - points[corners[:, :1]]
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    require_close(0.5 * normals.sum(axis=0), np.array([0.0, 0.0, 0.125]))
+    require_close(np.ptp(points, axis=0), np.array([0.5, 0.25, 0.0]))
+    require_close(visual.origin.matrix[:3, 2], np.array([1.0, 0.0, 0.0]))
+    broken = dynx.load(LABEL.format("<size>0 1</size>", "<box/>"))
+    with pytest.raises(DescriptionError, match="size of visual 'v' of link 'l' is 0 1; wanted positive"):
+        broken.geometry.visuals("l")
+
+
+@pytest.mark.parametrize(
+    ("plane", "collision"),
+    [("", "<box/>"), ("<size>9 9</size>", "<plane><size>9 9</size></plane>")],
+)
+def test_a_visual_plane_of_the_ground_has_no_end(plane: str, collision: str) -> None:
+    model = dynx.load(LABEL.format(plane, collision))
+    assert [each.shape for each in model.geometry.visuals("l")] == [Plane()]
+    assert any("a plane has no end" in each.message for each in model.notes) == bool(plane)
 
 
 @pytest.mark.parametrize(
