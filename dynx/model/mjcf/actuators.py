@@ -110,8 +110,8 @@ def _with_defaults(document: MjcfText, element: Element) -> Element:
     shared: dict[str, str] = {}
     for tag, given in others.items():
         for each, value in given.items():
-            if element.tag == "motor" and each not in _OF_ALL:
-                continue  # a motor has its own gain and no bias
+            if each in element.attributes or (element.tag == "motor" and each not in _OF_ALL):
+                continue  # What the actuator states comes first; a motor has its own gain and no bias.
             if each not in _OF_ALL or {shared.get(each, value), resolved.attributes.get(each, value)} != {
                 value
             }:

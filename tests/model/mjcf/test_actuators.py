@@ -115,6 +115,11 @@ def test_actuators_are_written_back(text: str) -> None:
         ),
         ('<general ctrlrange="-1 1"/><motor gear="3"/>', '<motor joint="k"/>', Actuator("", "k", 3)),
         ('<position kp="20"/><motor ctrlrange="-1 1"/>', '<motor joint="k"/>', Actuator("", "k")),
+        (
+            '<motor ctrllimited="true" ctrlrange="-180 180" gear="3"/>',
+            '<position joint="k" kp="20" gear="2" ctrlrange="-1 1"/>',
+            Actuator("", "k", 2, 20, (0, -20, 0)),
+        ),
     ],
 )
 def test_a_class_of_defaults_is_that_of_all_actuators(defaults: str, element: str, wanted: Actuator) -> None:
