@@ -11,9 +11,10 @@ linearly with the length of straight-line code. Values that a later segment need
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dynx.simd.elementary import elementary
@@ -217,36 +218,55 @@ def _loop(
     streaming: Streaming | None,
 ) -> str:
     """Return the entry function, a loop over groups of `lanes` samples, of which the last may overlap; and
-    what it needs to stream rows of results."""
+    the functions that it needs.
+
+    Code of several segments does not fit into the first-level cache. Each segment is therefore called for two
+    groups in turn, unless results are streamed.
+    """
     lanes = settings.lanes
     if streaming:
         slots += -(-streaming.job_bytes // (8 * lanes))
     called = _called(len(segments), settings)
     constant = [] if settings.quick else [f"segment{k}" for k, each in enumerate(segments) if each.constant]
+    varying = [name for name in called if name not in constant]
     words, start = ("%words", "begin") if streaming else ("%arguments", "entry")
+    paired = sum(bool(each.steps) for each in segments) > 1 and not settings.quick
+    memories = ["%kept", "%kept_second"][: 1 + paired]
+    prefetching = _prefetch_functions(program, lanes) if paired else {}
     lines = [
+        *prefetching.values(),
         *(streaming.functions() if streaming else ()),
         f"define void @{ENTRY}(ptr noalias nocapture readonly %arguments) {{",
         "entry:",
-        f"  %kept = alloca [{slots} x <{lanes} x double>], align 64",
+        f"  %kept = alloca [{slots * len(memories)} x <{lanes} x double>], align 64",
+        *(f"  {name} = getelementptr i8, ptr %kept, i64 {8 * lanes * slots}" for name in memories[1:]),
         "  %n = load i64, ptr %arguments",
         f"  %last = sub i64 %n, {lanes}",
-        *prefetch_pointers(program.inputs, program.outputs),
+        *([] if paired else prefetch_pointers(program.inputs, program.outputs)),
         *([f"  call void @{FILL}(ptr %kept)"] if settings.quick else []),
-        *(streaming.begin(constant) if streaming else ()),
+        *(streaming.begin(constant, memories) if streaming else ()),
         "  br label %group",
         "group:",
-        f"  %i = phi i64 [0, %{start}], [%next, %{'grouped' if streaming else 'group'}]",
+        f"  %i = phi i64 [0, %{start}], [%next, %{'grouped' if streaming or paired else 'group'}]",
         "  %late = icmp sgt i64 %i, %last",
         "  %first = select i1 %late, i64 %last, i64 %i",
     ]
-    lines += prefetch(program.inputs, program.outputs, lanes)
+    if paired:
+        names = [*varying, *constant]
+        lines += _pair_of_groups(names, list(prefetching), lanes, streams=streaming is not None)
+        lines += [f"  call void @{name}(ptr %arguments, i64 %first)" for name in prefetching]
+    else:
+        lines += prefetch(program.inputs, program.outputs, lanes)
     lines += streaming.before_group() if streaming else []
-    varying = [name for name in called if name not in constant]
     lines += [f"  call void @{name}(ptr {words}, i64 %first, ptr %kept)" for name in varying]
     lines += streaming.after_group(constant) if streaming else []
+    lines += ["  br label %grouped", "grouped:"] if streaming or paired else []
+    if paired:
+        lines.append(
+            f"  %count = phi i64 [{2 * lanes}, %pair], [{lanes}, %{'copied' if streaming else 'alone'}]"
+        )
     lines += [
-        f"  %next = add i64 %i, {lanes}",
+        f"  %next = add i64 %i, {'%count' if paired else lanes}",
         "  %more = icmp slt i64 %next, %n",
         "  br i1 %more, label %group, label %done",
         "done:",
@@ -255,6 +275,50 @@ def _loop(
         "}",
     ]
     return "\n".join(lines)
+
+
+def _pair_of_groups(
+    names: Sequence[str], prefetching: Sequence[str], lanes: int, *, streams: bool
+) -> list[str]:
+    """Return the code that calls each of the functions `names` for the samples from %first on and for the
+    next ones, and between them those that prefetch. It continues at the label ``alone`` if there are no next
+    samples, or if results are streamed."""
+    pair = (("%first", "%kept"), ("%second", "%kept_second"))
+    calls = [
+        f"  call void @{name}(ptr %arguments, i64 {first}, ptr {kept})"
+        for name in names
+        for first, kept in pair
+    ]
+    # Many prefetches at once would stall the processor.
+    rows = [f"  call void @{name}(ptr %arguments, i64 {first})" for first, _ in pair for name in prefetching]
+    ends = [len(rows) * (k + 1) // len(calls) for k in range(len(calls))]
+    parts = zip(calls, [0, *ends], ends, strict=False)
+    return [
+        f"  %i_second = add i64 %i, {lanes}",
+        "  %several = icmp slt i64 %i_second, %n",
+        f"  %two = select i1 {'%streams' if streams else 'false'}, i1 false, i1 %several",
+        "  br i1 %two, label %pair, label %alone",
+        "pair:",
+        "  %late_second = icmp sgt i64 %i_second, %last",
+        "  %second = select i1 %late_second, i64 %last, i64 %i_second",
+        *(line for call, begin, end in parts for line in (*rows[begin:end], call)),
+        "  br label %grouped",
+        "alone:",
+    ]
+
+
+def _prefetch_functions(program: Program, lanes: int) -> dict[str, str]:
+    """Return functions of the arguments and the first sample of a group, by name, each of which prefetches
+    half of the rows of an array that a later group needs."""
+    pointers = prefetch_pointers(program.inputs, program.outputs)
+    rows = list(_prefetched_rows(program.inputs, program.outputs, lanes))
+    found = {}
+    for number in range(2 * len(rows) // lanes):
+        half = rows[number * lanes // 2 : (number + 1) * lanes // 2]
+        name = f"prefetch{number}"
+        head = f"define internal void @{name}(ptr nocapture readonly %arguments, i64 %first) noinline {{"
+        found[name] = "\n".join([head, "entry:", *pointers, *chain(*half), "  ret void", "}"])
+    return found
 
 
 def _prefetched_arrays(ports: Sequence[Port]) -> list[tuple[int, int]]:
@@ -277,12 +341,16 @@ def prefetch_pointers(inputs: Sequence[Port], outputs: Sequence[Port]) -> list[s
 
 def prefetch(inputs: Sequence[Port], outputs: Sequence[Port], lanes: int) -> list[str]:
     """Return the code that prefetches the rows of a later group; a prefetch beyond an array is harmless."""
-    lines = []
+    return list(chain(*_prefetched_rows(inputs, outputs, lanes)))
+
+
+def _prefetched_rows(inputs: Sequence[Port], outputs: Sequence[Port], lanes: int) -> Iterator[list[str]]:
+    """Yield the code that prefetches each row of a later group than that of %first."""
     for k, size in _prefetched_arrays([*inputs, *outputs]):
         hint = PREFETCH_TO_READ if k < len(inputs) else PREFETCH_TO_WRITE
         for lane in range(lanes):
             row = f"{k}_{lane}"
-            lines += [
+            lines = [
                 f"  %sample{row} = add i64 %first, {PREFETCH_GROUPS * lanes + lane}",
                 f"  %offset{row} = mul i64 %sample{row}, %stride{k}",
                 f"  %row{row} = getelementptr i8, ptr %base{k}, i64 %offset{row}",
@@ -293,7 +361,7 @@ def prefetch(inputs: Sequence[Port], outputs: Sequence[Port], lanes: int) -> lis
                     f"  {place} = getelementptr i8, ptr %row{row}, i64 {start}",
                     f"  call void @llvm.prefetch.p0(ptr {place}, {hint}, i32 1)",
                 ]
-    return lines
+            yield lines
 
 
 _BINARY: dict[Op, str] = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}

@@ -81,11 +81,12 @@ class Streaming:
             turns += [((k + 0.5) / count, array.job) for k in range(count)]
         return [job for _, job in sorted(turns)]
 
-    def begin(self, constant_rows: Sequence[str]) -> list[str]:
+    def begin(self, constant_rows: Sequence[str], memories: Sequence[str]) -> list[str]:
         """Return the code that decides whether results are streamed, as %streams, and prepares that.
 
         It calls `constant_rows`, functions that store what all samples have in common. The code of a group
-        takes %words, its arguments.
+        takes %words, its arguments, and one of `memories`, those of the values; if results are streamed, the
+        first.
         """
         samples, copied = -(-MIN_STREAMED // sum(array.row for array in self.arrays)), 8 * self._words
         filled = [f"  call void @{name}(ptr %changed, i64 0, ptr %kept)" for name in constant_rows]
@@ -95,7 +96,7 @@ class Streaming:
             f"  call void @llvm.memcpy.p0.p0.i64(ptr %changed, ptr %arguments, i64 {copied}, i1 false)",
             f"  %streams = icmp sge i64 %n, {samples}",
             "  %words = select i1 %streams, ptr %changed, ptr %arguments",
-            *(line for array in self.arrays for line in self._pointers(array)),
+            *(line for array in self.arrays for line in self._pointers(array, memories[1:])),
             "  br i1 %streams, label %fill, label %begin",
             "fill:",
             *(f"  store i64 {array.row}, ptr %own_stride{array.number}" for array in self.arrays),
@@ -114,11 +115,19 @@ class Streaming:
             "begin:",
         ]
 
-    def _pointers(self, array: StreamedArray) -> list[str]:
+    def _pointers(self, array: StreamedArray, more: Sequence[str]) -> list[str]:
         k, base, stride = array.number, 1 + 2 * array.number, 2 + 2 * array.number
         return [
             f"  %job{k} = getelementptr i8, ptr %kept, i64 {array.job}",
             f"  store i64 0, ptr %job{k}",
+            *(
+                line
+                for memory in more
+                for line in (
+                    f"  %no_job{k} = getelementptr i8, ptr {memory}, i64 {array.job}",
+                    f"  store i64 0, ptr %no_job{k}",
+                )
+            ),
             f"  %out_base_at{k} = getelementptr i64, ptr %arguments, i64 {base}",
             f"  %out_base{k} = load ptr, ptr %out_base_at{k}",
             f"  %out_stride_at{k} = getelementptr i64, ptr %arguments, i64 {stride}",
@@ -157,11 +166,11 @@ class Streaming:
             ]
         return [
             *lines,
-            "  br label %grouped",
+            "  br label %copied",
             "complete:",
             *(f"  call void @{name}(ptr %arguments, i64 %first, ptr %kept)" for name in constant_rows),
-            "  br label %grouped",
-            "grouped:",
+            "  br label %copied",
+            "copied:",
         ]
 
     def end(self) -> list[str]:

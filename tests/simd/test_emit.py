@@ -194,15 +194,25 @@ def test_no_memory_outside_the_rows_is_written(
 
 
 def test_results_do_not_depend_on_the_position_in_the_batch() -> None:
-    """The last group overlaps the one before; results are the same bits for every batch size."""
+    """The last group overlaps the one before; results are the same bits for every batch size, also where two
+    groups are evaluated in turn."""
     rng = np.random.default_rng(4)
     x = doubles(rng, (33, 2))
     for target in TARGETS:
         for lanes in LANES:
-            machine = Machine(all_operations(), target, Settings(lanes))
-            (whole,) = machine([x])
+            one = Machine(all_operations(), target, Settings(lanes))
+            several = Machine(all_operations(), target, Settings(lanes, segment=8))
+            (whole,) = one([x])
             for n in range(lanes, 33):
-                assert same_bits(machine([x[:n]])[0], whole[:n])
+                assert same_bits(one([x[:n]])[0], whole[:n])
+                assert same_bits(several([x[:n]])[0], whole[:n])
+
+
+def test_each_segment_is_called_for_two_groups_in_turn() -> None:
+    """Segments of code that fits into the cache are called for one group."""
+    several = emit(all_operations(), TARGETS[0], Settings(2, segment=8))
+    assert several.count("call void @segment1(ptr %arguments, i64 %second, ptr %kept_second)") == 1
+    assert "%second" not in emit(all_operations(), TARGETS[0], Settings(2))
 
 
 def _ports(sizes: Sequence[int], stem: str) -> list[Port]:
@@ -240,13 +250,14 @@ def test_code_for_other_processors_of_the_family(target: Processor) -> None:
     assert register in machine.emit_assembly(module)
 
 
+@pytest.mark.parametrize("segment", [10, 2500])
 @pytest.mark.parametrize("size", [15, 16, 128, 129])
-def test_rows_of_medium_length_are_prefetched(size: int) -> None:
+def test_rows_of_medium_length_are_prefetched(size: int, segment: int) -> None:
     """Shorter rows stall little, and processors prefetch longer ones themselves."""
     graph = Graph()
     nodes = [graph.apply("neg", graph.input(k)) for k in range(size)]
     program = extract_program(graph, [Port("x", (size,))], [Port("y", (size,))], nodes)
-    text = emit(program, TARGETS[0], Settings(2))
+    text = emit(program, TARGETS[0], Settings(2, segment=segment))
     lines = 2 * -(-8 * size // 64) if 16 <= size <= 128 else 0
     for hint in ("i32 0, i32 2, i32 1", "i32 1, i32 3, i32 1"):
         assert text.count(f", {hint})") == lines
