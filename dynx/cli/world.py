@@ -35,7 +35,7 @@ from dynx.cli.shell.output import (
 )
 from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
 from dynx.errors import ArgumentError, DynxError, nearest, shown
-from dynx.files.figures import new_figure, picture_format, save_figure
+from dynx.files.figures import literal, new_figure, picture_format, save_figure
 from dynx.files.links import refuse_links
 from dynx.files.writing import write_bytes
 from dynx.spatial.so3 import quat_from_rotation
@@ -518,14 +518,14 @@ def plot(comparison: WorldComparison, path: str) -> None:
         for body in comparison.scene.bodies:
             if not body.fixed:
                 heights = [state.bodies[body.name].T_world_body[2, 3] for state in run.states]
-                axes.plot(run.times, heights, lw=1.3, label=_plain(body.name))
+                axes.plot(run.times, heights, lw=1.3, label=literal(body.name))
         for robot in comparison.scene.robots:
             if robot.model.floating:
                 heights = [state.robots[robot.name].q[2] for state in run.states]
-                axes.plot(run.times, heights, lw=1.3, label=_plain(robot.name))
+                axes.plot(run.times, heights, lw=1.3, label=literal(robot.name))
         axes.set_ylabel("height [m]")
     axes.set_xlabel("time [s]")
-    axes.set_title(_plain(comparison.scene.name), fontsize=11)
+    axes.set_title(literal(comparison.scene.name), fontsize=11)
     axes.grid(visible=True, color="0.9")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8)
@@ -535,11 +535,6 @@ def plot(comparison: WorldComparison, path: str) -> None:
 def _lowest(largest: float) -> float:
     """Return the lower limit of the logarithmic axis for a largest distance [m]."""
     return FLOOR if largest > FLOOR or largest == 0.0 else SPAN * largest
-
-
-def _plain(text: str) -> str:
-    """Escape `text` so that matplotlib shows it literally."""
-    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
 
 
 SUFFIXES = (".xml", ".mjcf", ".urdf", ".toml", ".json")

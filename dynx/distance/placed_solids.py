@@ -57,11 +57,6 @@ class PlacedSolid:
         T[:3, :3], T[:3, 3] = self.rows, self.p
         return T
 
-    @property
-    def is_plane(self) -> bool:
-        """True for a half-space."""
-        return self.solid.core is None and self.solid.field is None
-
 
 def placed_cores(a: PlacedSolid, b: PlacedSolid) -> tuple[Core, Core, Vector3]:
     """Return the cores of two bounded convex shapes at their poses, with the origin of b at zero, and the

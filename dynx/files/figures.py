@@ -20,6 +20,19 @@ RESOLUTION = 200
 NOTEBOOK_RESOLUTION = 100
 """Pixels per inch of a picture in a notebook."""
 
+LINE_STYLES = ("-", "--", "-.", ":")
+"""Styles of lines, which distinguish curves also in print without colour."""
+
+
+def line_style(k: int) -> dict[str, Any]:
+    """Return the colour and the style of the k-th curve of a panel."""
+    return {"color": f"C{k % 10}", "linestyle": LINE_STYLES[k % len(LINE_STYLES)]}
+
+
+def literal(text: str) -> str:
+    """Escape a text so that matplotlib shows it as it is: neither as a formula nor hidden from the legend."""
+    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
+
 
 def new_figure(width: float, height: float) -> Any:
     """Make a `matplotlib.figure.Figure` of that size [in]. Raises NotInstalledError without matplotlib."""

@@ -59,10 +59,6 @@ class LocalMotion:
         ]
         return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
-    def without_acceleration(self) -> LocalMotion:
-        """Return the motion with the same angular velocity and zero accelerations."""
-        return LocalMotion(self.omega, 0 * self.alpha, 0 * self.proper_acceleration)
-
     def proper_acceleration_at(self, p: Array) -> Array:
         """Return the proper acceleration (..., 3) of the point `p` of the body."""
         return np.asarray(self.proper_acceleration + rotate(self.acceleration_matrix, p))

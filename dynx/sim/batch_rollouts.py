@@ -13,7 +13,7 @@ import numpy as np
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import SCHEMA_ENTRY, read_arrays, write_arrays
-from dynx.files.figures import new_figure, save_figure
+from dynx.files.figures import literal, new_figure, save_figure
 from dynx.model import Model
 from dynx.model.numbers import checked_entries, real_array
 from dynx.rbd.jacobians import LOCAL
@@ -170,7 +170,12 @@ class BatchRollouts:
         upper.set_xlabel("largest error of any joint [rad or m]")
         upper.set_ylabel("share of rollouts below")
         sound = self.done & np.isnan(self.diverged)
-        lower.boxplot(self.max_error[sound], tick_labels=self.joint_names, whis=(5, 95), showfliers=False)
+        lower.boxplot(
+            self.max_error[sound],
+            tick_labels=[*map(literal, self.joint_names)],
+            whis=(5, 95),
+            showfliers=False,
+        )
         lower.set_ylabel("largest error [rad or m]")
         lower.tick_params(axis="x", rotation=30)
         if _spans_decades(worst):

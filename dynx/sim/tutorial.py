@@ -27,7 +27,7 @@ from dynx.errors import (
     SimulationError,
     UnsupportedFeatureError,
 )
-from dynx.files.figures import new_figure, save_figure
+from dynx.files.figures import line_style, new_figure, save_figure
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim.named_controllers import BUILT_IN, ControllerRequest, named_controller
@@ -167,9 +167,6 @@ def _missing(plant: str) -> str | None:
     return None
 
 
-STYLES = ("-", "--", "-.", ":")
-"""Line styles, so that curves can be distinguished without colour."""
-
 LEAST = 1e-16
 """Smallest error on the logarithmic axis; smaller ones are rounding errors and are drawn there."""
 
@@ -185,12 +182,7 @@ def plot_rows(rows: Sequence[Row], tutorial: Tutorial, path: str | os.PathLike[s
     for axis, plant in zip(panels, tutorial.plants, strict=True):
         for k, row in enumerate(rows):
             rollout = row.outcomes[plant].rollout
-            style: dict[str, Any] = {
-                "color": f"C{k % 10}",
-                "linestyle": STYLES[k % len(STYLES)],
-                "lw": 1.3,
-                "label": row.mode,
-            }
+            style = {**line_style(k), "lw": 1.3, "label": row.mode}
             if rollout is None:
                 axis.plot([], [], **style)
                 continue

@@ -144,11 +144,6 @@ def points_around(
     return np.clip(np.concatenate(found), low, high)
 
 
-def corners_of(low: Floats, high: Floats) -> Floats:
-    """Return the corners (8, 3) of a box."""
-    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * _SIGNS)
-
-
 def fitted_view(
     points: Floats, across: float, upward: float, towards: Floats = VIEW_DIRECTION
 ) -> tuple[Floats, Floats]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -24,7 +23,7 @@ from dynx.option_names import ANSWERS, as_object, checks_option_names, refuse_op
 from dynx.rbd.jacobians import LOCAL, checked_reference
 from dynx.registry import door, explains_names
 from dynx.spatial.scalar import Floats
-from dynx.steppers.clock import MAX_STEPS, refuse_too_many_steps, step_count
+from dynx.steppers.clock import MAX_STEPS, refuse_too_many_steps, step_count, steps_to
 from dynx.steppers.forces import ExternalForce
 from dynx.steppers.layout import ConstraintLayout, Layout, RobotLayout
 from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
@@ -72,15 +71,6 @@ def scene_at(scene: Scene, state: WorldState) -> Scene:
     return replace(scene, robots=tuple(robots), bodies=tuple(bodies))
 
 
-TIME_ROUNDING = 1e-9
-"""Tolerance within which the ratio of two times counts as a whole number."""
-
-
-def steps_in(duration: float, dt: float) -> int:
-    """Return the number of steps of `dt` [s] that last for `duration` [s], rounded up."""
-    return max(1, math.ceil(duration / dt - TIME_ROUNDING))
-
-
 def run_for(
     duration: float,
     dt: float,
@@ -93,7 +83,7 @@ def run_for(
     """Take steps for `duration` [s], rounded up to a multiple of `dt`, with the loads of a function or fixed
     ones."""
     refuse_too_many_steps("duration", positive_seconds("duration", duration), dt)
-    n = steps_in(duration, dt)
+    n = steps_to(duration, dt)
     if loads is None and not real_time:
         step(n, **fixed)
         return
@@ -274,7 +264,7 @@ class World:
             seconds = positive_seconds("contact_interval", contact_interval)
             refuse_too_many_steps("contact_interval", seconds, h)
             names = [collider.name for collider in self._layout.colliders]
-            self._contact_interval = ContactInterval(names, steps_in(seconds, h))
+            self._contact_interval = ContactInterval(names, steps_to(seconds, h))
         # Sensors read what the last step keeps before it keeps the next one.
         watchers = (self._last_step, self._sensors, self._contact_interval)
         self._watchers = [each for each in watchers if each is not None]

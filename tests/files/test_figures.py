@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from dynx.files.figures import NOTEBOOK_RESOLUTION, new_figure, svg_element
+from dynx.files.figures import NOTEBOOK_RESOLUTION, line_style, literal, new_figure, svg_element
 
 
 def test_a_notebook_shows_a_figure_as_a_picture() -> None:
@@ -99,3 +99,15 @@ def test_a_file_of_settings_in_the_current_folder_changes_no_figure(tmp_path: Pa
         printed.append(run.stdout)
     assert printed[0] == printed[1]
     assert ("'lines.linewidth': 5.0" in printed[0]) == own
+
+
+def test_names_are_shown_as_they_are() -> None:
+    name = "_arm$1$"
+    axes = new_figure(2.0, 2.0).subplots()
+    axes.plot([0.0, 1.0], label=literal(name), **line_style(13))
+    (handle,), (label,) = axes.get_legend_handles_labels()
+    text = axes.legend().get_texts()[0]
+    assert text.get_text().strip() == label.strip() == r"_arm\$1\$"
+    element = ElementTree.fromstring(svg_element(axes.figure))
+    assert name in {(each.text or "").strip() for each in element.iter("text")}
+    assert handle.get_linestyle() == "--" and handle.get_color() == "C3"

@@ -16,7 +16,7 @@ from dynx.cli.shell.output import Advance, Entry, check_json, check_writable, lo
 from dynx.cli.shell.tables import Table
 from dynx.envs.registration import bare_name, task_id
 from dynx.errors import ArgumentError, shown
-from dynx.files.figures import new_figure, picture_format, save_figure
+from dynx.files.figures import line_style, literal, new_figure, picture_format, save_figure
 from dynx.training import Progress, Schedule, TaskSpec, Trained, TrainingSpec, recipe_of
 from dynx.training import train as train_run
 from dynx.training.file_tasks import task_of_file
@@ -243,7 +243,7 @@ def show(out: Console, report: Entry) -> None:
     out.print(f"to see it: dynx play {one_line(report['runs'][0]['folder'])}/final.zip --view{own}")
 
 
-_STYLES, _MARKS = ("-", "--", ":", "-."), "os^v"
+_MARKS = "os^v"
 
 
 def plot(runs: Sequence[Trained], path: str) -> None:
@@ -251,28 +251,27 @@ def plot(runs: Sequence[Trained], path: str) -> None:
     figure = new_figure(7.0, 4.0)
     axes = figure.subplots()
     for k, run in enumerate(runs):
-        colour, seed = f"C{k}", run.policy.spec.seed
+        style = line_style(k)
         curve = read_lines(run.folder / CURVE)
         axes.plot(
             [each["steps"] for each in curve],
             [each["mean_return"] for each in curve],
-            _STYLES[k % len(_STYLES)],
-            color=colour,
-            label=f"seed {seed}",
+            label=f"seed {run.policy.spec.seed}",
+            **style,
         )
         judged = read_lines(run.folder / EVALUATIONS)
         axes.plot(
             [each["steps"] for each in judged],
             [each["mean"] for each in judged],
             _MARKS[k % len(_MARKS)],
-            color=colour,
+            color=style["color"],
             ms=5,
             mfc="none",
         )
     spec = runs[0].policy.spec
     axes.set_xlabel("steps")
     axes.set_ylabel("return: last 100 episodes (line), evaluation (mark)")
-    axes.set_title(f"{spec.task.name}, {spec.algorithm}")
+    axes.set_title(literal(f"{spec.task.name}, {spec.algorithm}"))
     axes.grid(True, alpha=0.3)
     axes.legend()
     save_figure(figure, path)

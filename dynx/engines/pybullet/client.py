@@ -248,20 +248,6 @@ class RobotClient(BulletClient, ABC):
         self.call(self.engine.applyExternalForce, self.body, ROOT, force, point, frame)
         self.call(self.engine.applyExternalTorque, self.body, ROOT, torque, frame)
 
-    def add_torques(self, torques: Reals) -> None:
-        """Apply joint torques during the next step, in addition to those of motors."""
-        if not isfinite(sum(torques)):
-            self.check(torques)
-        if torques:
-            engine, client = self.engine, self.number
-            try:
-                # As `control_motors` does, which takes a microsecond more.
-                engine.setJointMotorControlArray(
-                    self.body, self.moving, engine.TORQUE_CONTROL, forces=torques, physicsClientId=client
-                )
-            except self.errors as error:
-                raise self.failure(engine.setJointMotorControlArray.__name__, error) from error
-
     def control_motors(self, mode: int, **targets: Reals) -> None:
         """Set the control mode of all joints, with the targets, gains and forces of their motors."""
         self.call(self.engine.setJointMotorControlArray, self.body, self.moving, mode, **targets)

@@ -15,14 +15,11 @@ import numpy as np
 
 from dynx.argument_types import checks_types
 from dynx.control.base import Controller, chain_of
-from dynx.files.figures import new_figure, save_figure
+from dynx.files.figures import LINE_STYLES, line_style, literal, new_figure, save_figure
 from dynx.model import Model
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.record.tracking_error import frame_pose_errors
 from dynx.spatial.scalar import Floats
-
-STYLES = ("-", "--", "-.", ":")
-"""Line styles. With matplotlib's ten colours they distinguish curves, also in print without colour."""
 
 PER_COLUMN = 12
 """Largest number of curves in one panel."""
@@ -71,7 +68,7 @@ def plot(rollout: Rollout, path: str | os.PathLike[str] | None = None) -> Any:
         _draw(rollout, column, axes, frame if column is columns[0] else None)
     if forces:
         _draw_contacts(rollout.t[:-1], forces, panels[0])
-    figure.suptitle(_plain(_title(rollout)), fontsize=11)
+    figure.suptitle(literal(_title(rollout)), fontsize=11)
     if path is not None:
         save_figure(figure, path)
     return figure
@@ -94,8 +91,8 @@ def _contact_forces(rollout: Rollout) -> dict[str, Floats]:
 def _draw_contacts(t: Floats, forces: dict[str, Floats], panels: Any) -> None:
     """Draw the contact forces in the first panel of a row, and hide the others."""
     for k, (name, force) in enumerate(forces.items()):
-        style = {"color": f"C{k % 10}", "linestyle": STYLES[k // 10 % len(STYLES)], "lw": 1.1}
-        panels[0].step(t, force, where="post", label=_plain(name), **style)
+        style = {"color": f"C{k % 10}", "linestyle": LINE_STYLES[k // 10 % len(LINE_STYLES)], "lw": 1.1}
+        panels[0].step(t, force, where="post", label=literal(name), **style)
     panels[0].set_ylabel("contact force [N]")
     panels[0].grid(visible=True, color="0.9")
     panels[0].legend(fontsize=7, ncols=2)
@@ -159,8 +156,8 @@ def _draw(rollout: Rollout, column: Column, axes: Any, frame: str | None) -> Non
     limits = _effort_limits(rollout)[column.v]
     curves, limit = {}, None
     for k, label in enumerate(column.labels):
-        style: dict[str, Any] = {"color": f"C{k % 10}", "linestyle": STYLES[k % len(STYLES)], "lw": 1.3}
-        (curves[_plain(label)],) = positions.plot(t, q[:, k], **style)
+        style = {**line_style(k), "lw": 1.3}
+        (curves[literal(label)],) = positions.plot(t, q[:, k], **style)
         if rollout.reference is not None:
             wanted = positions.plot(t, rollout.reference.q[:, column.q][:, k], color="0.6", lw=0.8, zorder=0)
         between = rollout.v if rollout.reference is None else rollout.error
@@ -182,7 +179,7 @@ def _draw(rollout: Rollout, column: Column, axes: Any, frame: str | None) -> Non
     speed = "; ".join(f"{unit}/s" for unit in length.split("; "))
     middle.set_ylabel(f"velocity [{speed}]" if rollout.reference is None else f"error q* - q [{length}]")
     if frame is not None:
-        middle.set_ylabel(f"error of {_plain(frame)} [m; rad]")
+        middle.set_ylabel(f"error of {literal(frame)} [m; rad]")
     efforts.set_ylabel(f"torque [{force}]" if "N m" in force else f"force [{force}]")
     if column.of_ball:
         positions.set_ylabel("vector part of the quaternion")
@@ -216,8 +213,3 @@ def _effort_limits(rollout: Rollout) -> Floats:
     """Return the effort limits at which torques were saturated; if there were none, those of the robot."""
     cut = rollout.settings.get("effort_limits")
     return rollout.model.effort_limit if cut is None else np.asarray(cut, dtype=np.float64)
-
-
-def _plain(text: str) -> str:
-    """Escape `text` so that matplotlib shows it literally: neither a formula nor hidden from the legend."""
-    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")

@@ -6,7 +6,7 @@ import os
 from typing import Any
 
 from dynx.argument_types import checks_types
-from dynx.files.figures import new_figure, save_figure
+from dynx.files.figures import literal, new_figure, save_figure
 from dynx.world.sensors.readings import Readings
 
 
@@ -31,7 +31,7 @@ def plot(readings: Readings, path: str | os.PathLike[str] | None = None) -> Any:
         if len(channel.components) > 1:
             panel.legend(fontsize=8, ncols=len(channel.components))
     panels[-1].set_xlabel("time [s]")
-    figure.suptitle(str(readings.sensor).replace("$", r"\$"), fontsize=11)
+    figure.suptitle(literal(str(readings.sensor)), fontsize=11)
     if path is not None:
         save_figure(figure, path)
     return figure
