@@ -40,14 +40,15 @@ __all__ = [
 
 # Hidden from type checkers, which would take any name for an attribute.
 if not TYPE_CHECKING:
-    _PLACES = {"StatedEquality": "equalities", "StatedGravityCompensation": "gravity_compensation"}
-    _PLACES |= {"Actuator": "actuators", "NamedConfiguration": "stated_configurations"}
-    _PLACES |= {"StatedSensor": "sensors", "StatedTendon": "tendons"}
-    __getattr__ = moved_names(__name__, {}, {name: f"dynx.model.{at}" for name, at in _PLACES.items()})
+    _STATED = [name for name in __all__ if name.startswith("Stated")]
+    _STATED += ["Actuator", "NamedConfiguration"]
+    __getattr__ = moved_names(__name__, {}, dict.fromkeys(_STATED, "dynx.model.stated_parts"))
 else:
-    from dynx.model.actuators import Actuator
-    from dynx.model.equalities import StatedEquality
-    from dynx.model.gravity_compensation import StatedGravityCompensation
-    from dynx.model.sensors import StatedSensor
-    from dynx.model.stated_configurations import NamedConfiguration
-    from dynx.model.tendons import StatedTendon
+    from dynx.model.stated_parts import (
+        Actuator,
+        NamedConfiguration,
+        StatedEquality,
+        StatedGravityCompensation,
+        StatedSensor,
+        StatedTendon,
+    )

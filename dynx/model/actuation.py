@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
-from dynx.model.actuators import Actuator
 from dynx.model.configuration import checked_q
 from dynx.model.model import Model
 from dynx.model.numbers import checked_array
+from dynx.model.stated_parts import Actuator
 from dynx.spatial.scalar import Array, Floats, maximum, minimum, where_less
 
 

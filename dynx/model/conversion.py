@@ -23,7 +23,6 @@ from dynx.files.temporary import temporary_folder
 from dynx.files.writing import write_bytes
 from dynx.model.document_format import SUFFIXES, Format
 from dynx.model.elements import Frame, Inertial, Joint, Pose
-from dynx.model.equalities import StatedEquality
 from dynx.model.geometry import (
     Box,
     Capsule,
@@ -42,7 +41,7 @@ from dynx.model.mjcf.sensor_objects import SensorObjects
 from dynx.model.mjcf.writer import MESH_SUFFIXES, RobotWriter
 from dynx.model.model import Model
 from dynx.model.sdf.writer import SdfWriter
-from dynx.model.tendons import StatedTendon
+from dynx.model.stated_parts import StatedEquality, StatedTendon
 from dynx.model.urdf.writer import urdf_notes, urdf_text
 from dynx.spatial.scalar import Floats
 

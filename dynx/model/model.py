@@ -23,7 +23,7 @@ from dynx.registry import door, explains_names
 from dynx.spatial.scalar import Floats, longdouble
 
 if TYPE_CHECKING:
-    from dynx.model.actuators import Actuator
+    from dynx.model.stated_parts import Actuator
 
 
 @explains_names

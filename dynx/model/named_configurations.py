@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
 from dynx.model.configuration import checked_q, neutral
 from dynx.model.model import Model
-from dynx.model.stated_configurations import NamedConfiguration
+from dynx.model.stated_parts import NamedConfiguration
 from dynx.model.tree import Tree
 from dynx.spatial.scalar import Floats
 

@@ -19,7 +19,7 @@ from dynx.model.elements import Note
 from dynx.model.model import Model
 from dynx.model.numbers import checked_quaternion
 from dynx.model.package_search import StrPath
-from dynx.model.stated_configurations import NamedConfiguration
+from dynx.model.stated_parts import NamedConfiguration
 from dynx.model.xml.reading import Element, read_xml
 from dynx.model.xml.values import Reading
 

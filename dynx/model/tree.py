@@ -26,12 +26,14 @@ from dynx.registry import door
 from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
-    from dynx.model.actuators import Actuator
-    from dynx.model.equalities import StatedEquality
-    from dynx.model.gravity_compensation import StatedGravityCompensation
-    from dynx.model.sensors import StatedSensor
-    from dynx.model.stated_configurations import NamedConfiguration
-    from dynx.model.tendons import StatedTendon
+    from dynx.model.stated_parts import (
+        Actuator,
+        NamedConfiguration,
+        StatedEquality,
+        StatedGravityCompensation,
+        StatedSensor,
+        StatedTendon,
+    )
 
 Base = Literal["fixed", "floating"]
 Part = TypeVar("Part")

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynx.model import Model
 from dynx.model.elements import Pose
-from dynx.model.stated_configurations import NamedConfiguration
+from dynx.model.stated_parts import NamedConfiguration
 from dynx.same.attributes import Attribute, Kind, listed, number_text
 from dynx.same.decimals import rounded
 from dynx.same.fit import Fit

@@ -11,9 +11,8 @@ import numpy as np
 
 from dynx.model import Model
 from dynx.model.elements import INFINITY
-from dynx.model.equalities import LINEAR, StatedEquality
 from dynx.model.mechanism import ROOT
-from dynx.model.tendons import StatedTendon
+from dynx.model.stated_parts import LINEAR, StatedEquality, StatedTendon
 from dynx.same.attributes import Attribute, DescriptionFreedom, number_text
 from dynx.same.decimals import decimals, rounded
 from dynx.same.fit import BodyFit, Fit, angle_of

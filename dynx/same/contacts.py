@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from itertools import product
 
 from dynx.model import Model
-from dynx.model.actuators import Actuator
 from dynx.model.elements import INFINITY, ZERO, Joint
 from dynx.model.geometry.links import ContactFilter, ShapeNumber
 from dynx.model.mechanism import ROOT
-from dynx.model.tendons import StatedTendon
+from dynx.model.stated_parts import Actuator, StatedTendon
 from dynx.same.attributes import (
     Attribute,
     DescriptionFreedom,

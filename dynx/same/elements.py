@@ -17,7 +17,7 @@ import numpy as np
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint, Link, Pose, Vector
 from dynx.model.mechanism import ROOT, pose_arrays
-from dynx.model.stated_configurations import NamedConfiguration
+from dynx.model.stated_parts import NamedConfiguration
 from dynx.model.topology import resolve_mimics
 from dynx.same.decimals import decimals, fifty_digits, rounded
 from dynx.same.fit import BodyFit, Fit, angle_of, drive, fit

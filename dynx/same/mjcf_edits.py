@@ -16,7 +16,6 @@ import numpy as np
 
 from dynx.model import Model
 from dynx.model.elements import Inertial, Joint
-from dynx.model.equalities import LINEAR, StatedEquality
 from dynx.model.mjcf.document import MjcfText, turn
 from dynx.model.mjcf.equalities import EqualityWriter
 from dynx.model.mjcf.expansion import read_document
@@ -29,8 +28,7 @@ from dynx.model.mjcf.tendons import (
     write_tendons,
 )
 from dynx.model.mjcf.writer import inertial_attributes
-from dynx.model.stated_configurations import NamedConfiguration
-from dynx.model.tendons import StatedTendon
+from dynx.model.stated_parts import LINEAR, NamedConfiguration, StatedEquality, StatedTendon
 from dynx.model.xml.reading import Element
 from dynx.model.xml.several_files import file_of_line
 from dynx.model.xml.source import Edit, SourceElement, XmlSource

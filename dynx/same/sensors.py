@@ -9,7 +9,7 @@ import numpy as np
 from dynx.model import Model
 from dynx.model.mechanism import BodyFrame
 from dynx.model.mjcf.sensor_objects import WORLD
-from dynx.model.sensors import StatedSensor
+from dynx.model.stated_parts import StatedSensor
 from dynx.same.attributes import Attribute, number_text
 from dynx.same.decimals import decimals, rounded
 from dynx.same.fit import Fit, angle_of

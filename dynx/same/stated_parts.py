@@ -11,10 +11,8 @@ import numpy as np
 
 from dynx.model import Model
 from dynx.model.elements import Pose
-from dynx.model.equalities import StatedEquality
 from dynx.model.mjcf.sensor_objects import WORLD
-from dynx.model.stated_configurations import NamedConfiguration
-from dynx.model.tendons import StatedTendon
+from dynx.model.stated_parts import NamedConfiguration, StatedEquality, StatedTendon
 from dynx.same.attributes import StatedEffect
 from dynx.same.configurations import ConfigurationPair, configuration_pairs, joints_of_other_kinds
 from dynx.same.constraints import Constraints, equality_pairs, tendon_pairs_compared

@@ -39,7 +39,6 @@ from dynx.model.numbers import MAX_INDEX, array_of, checked_array, real_array, w
 from dynx.sim.batch_rollouts import BatchRollouts
 from dynx.sim.loop_step import PLACEHOLDER, ArrayDisturbances, LoopStep, gain_shapes, innermost
 from dynx.sim.noise import Noise
-from dynx.sim.plants.disturbances import refuse_unstable
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.options import COEFFICIENTS as COEFFICIENTS_KIND
 from dynx.sim.scenario.options import FORMER_NAMES, OPTIONS, option, takes
@@ -441,9 +440,6 @@ def columns_of(name: str, values: ArrayLike) -> Floats:
 MASS_MATRICES = 1024
 """Number of rollouts whose mass matrices are in memory at a time."""
 
-SEMI_IMPLICIT = 2.0
-"""Largest stable h f / (M s) of semi-implicit Euler."""
-
 
 def refuse_small_slips(
     acting: ArrayDisturbances,
@@ -462,6 +458,8 @@ def refuse_small_slips(
         return
     inputs = ("joint_friction", "joint_armature", "parameters")
     given = {"q": q, **{name: rows[name] for name in inputs if name in rows}}
+    from dynx.steppers.stability import refuse_unstable_slip
+
     spread = {name: np.atleast_2d(array) for name, array in given.items()}
     n = max(map(len, spread.values()))
     with backend("reference", model, validate=False) as engine:
@@ -477,7 +475,7 @@ def refuse_small_slips(
                 M = parametric.mass_matrix(here["q"], here["parameters"])
                 dry = dry + parametric.dry_friction(here["parameters"])
             M, dry = M + armature, np.broadcast_to(dry, (max(len(M), len(dry)), model.nv))
-            refuse_unstable(model, slip, SEMI_IMPLICIT, h, M, dry, first if n > 1 else None)
+            refuse_unstable_slip(model, slip, h, M, dry, first=first if n > 1 else None)
 
 
 def _coefficients(acting: ArrayDisturbances, rows: Mapping[str, Floats]) -> tuple[Floats, Floats]:

@@ -18,9 +18,6 @@ from dynx.control.content import attributes_of, fields_of
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
-UNSTABLE_RATIO = 2.0
-"""Ratio of `Overshoot` above which the velocity grows from one control step to the next."""
-
 MIN_REVERSALS = 20
 """Number of successive control steps in each of which the torque of a joint reverses if its oscillation does
 not decay."""
@@ -47,10 +44,12 @@ class Overshoot(NamedTuple):
 
     def hint(self, step: str) -> str:
         """Return the ratio and what can be done; `step` is the control step's name, dt or control_dt."""
+        from dynx.steppers.stability import SEMI_IMPLICIT
+
         ratio = f"{self.gain} {step} / inertia" if self.by_inertia else f"{self.gain} {step}"
         return (
-            f"{ratio} is {self.ratio:.3g} at {self.joint}, and a step is unstable above {UNSTABLE_RATIO:g}; "
-            f"smaller gains or a smaller {step} can help"
+            f"{ratio} is {self.ratio:.3g} at {self.joint}, and a step is unstable above "
+            f"{SEMI_IMPLICIT.damping:g}; smaller gains or a smaller {step} can help"
         )
 
 
@@ -80,11 +79,13 @@ def sustained_overshoot(
     oscillates = np.asarray(sliding_window_view(reverses, MIN_REVERSALS, axis=0).all(axis=-1).any(axis=0))
     if not oscillates.any() or controller is None:
         return None
+    from dynx.steppers.stability import SEMI_IMPLICIT  # loops that do not oscillate need none
+
     names = [name for name, found in zip(controller.model.coordinate_names, oscillates, strict=True) if found]
     unstable = (
         each
         for each in _overshoots(controller, q, control_dt, armature)
-        if each.joint in names and each.ratio > UNSTABLE_RATIO
+        if each.joint in names and each.ratio > SEMI_IMPLICIT.damping
     )
     return max(unstable, key=lambda each: each.ratio, default=None)
 

@@ -116,7 +116,7 @@ class RobotLoads:
         """Yield one sentence for springs that are unstable at the start in steps of the engine."""
         springs = self._robot.springs
         if springs is not None:
-            from dynx.steppers.stiff_springs import notes_on_springs  # most robots have none
+            from dynx.steppers.stability import notes_on_springs  # most robots have none
 
             M = self.mass_matrix(self._robot.q)
             yield from notes_on_springs(self.model, springs, M, self._h, robot=f"{self.name}/")
@@ -197,7 +197,7 @@ class RobotLoads:
     @cached_property
     def _mobility(self) -> Floats:
         """Acceleration of each joint (n,) at the start for a unit of its own torque."""
-        from dynx.world.stiff_gains import mobility_of
+        from dynx.steppers.stability import mobility_of
 
         return mobility_of(self.mass_matrix(self._robot.q))[self._base :]
 
@@ -205,10 +205,10 @@ class RobotLoads:
         """Keep a sentence on motors that are unstable at the start; contacts may keep their motion finite."""
         law, implicit = self._law, self._implicit_joints
         if ((1.0 - implicit) * (law.kp + law.kd) > 0.0).any():
-            from dynx.world.stiff_gains import stiff_gains  # a world without motors needs none
+            from dynx.steppers.stability import notes_on_gains  # a world without motors needs none
 
             names = self.model.coordinate_names
-            self.gain_notes += stiff_gains(self.name, names, law, implicit, self._mobility, self._h)
+            self.gain_notes += notes_on_gains(self.name, names, law, implicit, self._mobility, self._h)
 
     def torque(
         self,

@@ -364,7 +364,7 @@ def _gravity(layout: Layout, h: float) -> Iterator[str]:
 
 
 def _gains_and_torques(layout: Layout, state: WorldState, loads: LastLoads, h: float) -> Iterator[str]:
-    from dynx.world.stiff_gains import mobility_of, stiff_gains
+    from dynx.steppers.stability import mobility_of, notes_on_gains
 
     for load in loads.robots:
         robot = layout.robots[load.robot]
@@ -372,7 +372,7 @@ def _gains_and_torques(layout: Layout, state: WorldState, loads: LastLoads, h: f
         names = robot.model.coordinate_names
         base = len(mobility) - len(names)
         if load.law is not None and load.implicit is not None and len(names):
-            yield from stiff_gains(robot.name, names, load.law, load.implicit, mobility[base:], h)
+            yield from notes_on_gains(robot.name, names, load.law, load.implicit, mobility[base:], h)
         if load.torque is not None and len(mobility):
             change = h * np.abs(load.torque) * mobility
             k = int(np.argmax(change))
@@ -390,7 +390,7 @@ def _implicit_gains(layout: Layout, state: WorldState, loads: LastLoads, h: floa
     It computes the velocity at the end of the step with the other forces of the step before. What these
     change by in a step acts as if there were no motor; the stiffer the gains, the harder the correction.
     """
-    from dynx.world.stiff_gains import mobility_of
+    from dynx.steppers.stability import mobility_of
 
     for load in loads.robots:
         robot = layout.robots[load.robot]

@@ -110,4 +110,4 @@ def test_names_are_shown_as_they_are() -> None:
     assert text.get_text().strip() == label.strip() == r"_arm\$1\$"
     element = ElementTree.fromstring(svg_element(axes.figure))
     assert name in {(each.text or "").strip() for each in element.iter("text")}
-    assert handle.get_linestyle() == "--" and handle.get_color() == "C3"
+    assert (handle.get_linestyle(), handle.get_color()) == ("--", "C3")

@@ -17,7 +17,7 @@ from dynx.agreement.tolerances import BAR
 from dynx.errors import ArgumentError, NotFiniteError, ShapeError
 from dynx.model import Joint, Link, Model
 from dynx.model.actuation import Actuation, actuation_of
-from dynx.model.actuators import Actuator
+from dynx.model.stated_parts import Actuator
 from dynx.spatial.scalar import Floats
 from dynx.world import Scene, SceneRobot, World, read_scene
 from tests.model.mjcf.test_actuators import actuator_elements, compiled, document, numbers, positive

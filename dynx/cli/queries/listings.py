@@ -21,7 +21,7 @@ from dynx.errors import BackendError
 from dynx.model import Joint, Link, Model, library
 from dynx.model.documents import pose_numbers
 from dynx.model.elements import IDENTITY
-from dynx.model.sensors import StatedSensor
+from dynx.model.stated_parts import StatedSensor
 from dynx.model.xml.several_files import file_of_line
 
 

@@ -1,4 +1,4 @@
-"""Actuators of MJCF that act on one joint or tendon, in the terms of `dynx.model.actuators.Actuator`.
+"""Actuators of MJCF that act on one joint or tendon, in the terms of `dynx.model.stated_parts.Actuator`.
 
 The shortcuts ``motor``, ``position`` and ``velocity`` are written by MuJoCo as a ``general`` actuator, and
 so they are here. Taken are fixed gains and affine biases without a state of their own.
@@ -11,10 +11,10 @@ from xml.etree.ElementTree import Element as Written
 from xml.etree.ElementTree import SubElement
 
 from dynx.errors import escaped, shown
-from dynx.model.actuators import Actuator
 from dynx.model.elements import INFINITY, ZERO, Joint, Vector
 from dynx.model.mjcf.attributes import UNLIMITED, text
 from dynx.model.mjcf.document import ACTUATORS, MjcfText
+from dynx.model.stated_parts import Actuator
 from dynx.model.xml.reading import Element
 
 Range = tuple[float, float]

@@ -1,4 +1,4 @@
-"""Equality constraints of MJCF, in the terms of `dynx.model.equalities.StatedEquality`.
+"""Equality constraints of MJCF, in the terms of `dynx.model.stated_parts.StatedEquality`.
 
 MuJoCo lets a ``connect`` or ``weld`` of bodies coincide where it does so in the pose of the file, `qpos0`,
 unless ``relpose`` says where. The reader computes both poses, and the writer states them by the pose of the
@@ -16,12 +16,12 @@ import numpy as np
 
 from dynx.errors import nearest, shown
 from dynx.model.elements import IDENTITY, Pose
-from dynx.model.equalities import LINEAR, Polynomial, StatedEquality
 from dynx.model.mjcf.attributes import quat_wxyz, text
 from dynx.model.mjcf.document import MjcfText
 from dynx.model.mjcf.extension import MIMIC
 from dynx.model.mjcf.sensor_objects import WORLD
 from dynx.model.mjcf.sensors import names_by_kind
+from dynx.model.stated_parts import LINEAR, Polynomial, StatedEquality
 from dynx.model.xml.reading import Element
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse

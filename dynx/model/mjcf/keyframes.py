@@ -16,7 +16,7 @@ import numpy as np
 
 from dynx.errors import escaped, shown
 from dynx.model.mjcf.document import MjcfText
-from dynx.model.stated_configurations import NamedConfiguration
+from dynx.model.stated_parts import NamedConfiguration
 from dynx.model.xml.reading import Element
 from dynx.model.xml.several_files import free_name
 from dynx.spatial.scalar import Floats

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from dynx.errors import escaped, nearest, shown
-from dynx.model.actuators import Actuator
 from dynx.model.elements import (
     IDENTITY,
     INFINITY,
@@ -34,11 +33,9 @@ from dynx.model.elements import (
     Pose,
     Vector,
 )
-from dynx.model.equalities import StatedEquality
 from dynx.model.geometry import Geometry, LinkGeometry
 from dynx.model.geometry.links import ContactFilter
 from dynx.model.geometry.solids import inertial_of
-from dynx.model.gravity_compensation import StatedGravityCompensation
 from dynx.model.mjcf.actuators import read_actuators
 from dynx.model.mjcf.attributes import UNLIMITED
 from dynx.model.mjcf.contacts import read_contacts
@@ -53,9 +50,14 @@ from dynx.model.mjcf.shapes import Geom, GeomReader
 from dynx.model.mjcf.tendons import read_tendons
 from dynx.model.mjcf.vocabulary import unknown_parts, unused_attributes
 from dynx.model.package_search import StrPath
-from dynx.model.sensors import StatedSensor
-from dynx.model.stated_configurations import NamedConfiguration
-from dynx.model.tendons import StatedTendon
+from dynx.model.stated_parts import (
+    Actuator,
+    NamedConfiguration,
+    StatedEquality,
+    StatedGravityCompensation,
+    StatedSensor,
+    StatedTendon,
+)
 from dynx.model.topology import MAX_LINKS
 from dynx.model.tree import Base, Description
 from dynx.model.urdf.reader import inertia_fault

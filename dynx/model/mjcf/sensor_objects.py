@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from dynx.model.elements import INFINITY, Joint
 from dynx.model.geometry.links import Collision, Geometry, Visual
-from dynx.model.sensors import StatedSensor
+from dynx.model.stated_parts import StatedSensor
 from dynx.model.tree import Description, Tree
 
 WORLD = "world"

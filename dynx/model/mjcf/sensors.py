@@ -1,4 +1,4 @@
-"""Sensors of MJCF, in the terms of `dynx.model.sensors.StatedSensor`."""
+"""Sensors of MJCF, in the terms of `dynx.model.stated_parts.StatedSensor`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dynx.errors import escaped, nearest, shown
 from dynx.model.mjcf.attributes import text
 from dynx.model.mjcf.document import MjcfText
 from dynx.model.mjcf.sensor_objects import WORLD, SensorObjects
-from dynx.model.sensors import StatedSensor
+from dynx.model.stated_parts import StatedSensor
 from dynx.model.xml.reading import Element
 
 Slot = Mapping[str, str]

@@ -1,4 +1,4 @@
-"""Fixed tendons of MJCF, in the terms of `dynx.model.tendons.StatedTendon`."""
+"""Fixed tendons of MJCF, in the terms of `dynx.model.stated_parts.StatedTendon`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dynx.model.elements import INFINITY, Joint
 from dynx.model.mjcf.attributes import UNLIMITED, text
 from dynx.model.mjcf.document import ATTRIBUTES, TENDON_SOFTNESS, MjcfText
 from dynx.model.mjcf.sensors import names_by_kind
-from dynx.model.tendons import StatedTendon
+from dynx.model.stated_parts import StatedTendon
 from dynx.model.xml.reading import Element
 
 UNBOUNDED = (-INFINITY, INFINITY)

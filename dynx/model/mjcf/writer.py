@@ -21,7 +21,6 @@ import numpy as np
 
 from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, UnsupportedFeatureError, shown
-from dynx.model.actuators import Actuator
 from dynx.model.elements import IDENTITY, ZERO, Inertial, Joint, Limits, Link, Mimic, Pose
 from dynx.model.geometry import (
     Appearance,
@@ -53,6 +52,7 @@ from dynx.model.mjcf.extension import MIMIC, Extension
 from dynx.model.mjcf.sensor_objects import SensorObjects
 from dynx.model.mjcf.sensors import write_sensors
 from dynx.model.mjcf.tendons import write_tendons
+from dynx.model.stated_parts import Actuator
 from dynx.model.tree import Tree
 from dynx.model.urdf.reader import inertia_fault
 from dynx.model.urdf.writer import listed, note_of_kind

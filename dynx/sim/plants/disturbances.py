@@ -16,7 +16,6 @@ import numpy as np
 from dynx.backends import Backend, backend
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.joint_friction import Coefficients, JointFriction, armature_matrix
-from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.elements import JointCoefficients
 from dynx.option_names import checks_field_names
@@ -26,9 +25,6 @@ from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
 from dynx.steppers.implicit_joints import ImplicitJoints
 from dynx.steppers.robot_step import AddLoad
-
-STABLE = {"rk4": 2.78, "adaptive": np.inf}
-"""Largest h f / (M s) by integrator; 2 for all others."""
 
 
 @checks_field_names(damping="joint_damping", friction="joint_friction", armature="joint_armature")
@@ -139,12 +135,11 @@ def notes_on_springs(disturbances: Disturbances, integrator: str | None, h: floa
     model, springs = disturbances.model, disturbances.springs
     if springs is None:
         return []
-    from dynx.steppers import stiff_springs  # most robots have none
+    from dynx.steppers import stability  # most robots have none
 
     with backend("reference", model, validate=False) as engine:
         M = engine.mass_matrix(q) + disturbances.armature
-    bound = stiff_springs.STABLE.get(integrator or "", stiff_springs.SEMI_IMPLICIT)
-    return [*stiff_springs.notes_on_springs(model, springs, M, h, bound)]
+    return [*stability.notes_on_springs(model, springs, M, h, integrator)]
 
 
 def refuse_small_slip(disturbances: Disturbances, integrator: str, h: float, q: Floats) -> None:
@@ -152,40 +147,8 @@ def refuse_small_slip(disturbances: Disturbances, integrator: str, h: float, q: 
     model, slip, dry = disturbances.model, disturbances.friction.slip, disturbances.friction.dry
     if not slip or not dry.any():
         return
+    from dynx.steppers.stability import refuse_unstable_slip
+
     with backend("reference", model, validate=False) as engine:
         M = engine.mass_matrix(q) + disturbances.armature
-    refuse_unstable(model, slip, STABLE.get(integrator, 2.0), h, M[None], dry[None])
-
-
-def refuse_unstable(
-    model: Model, slip: float, most: float, h: float, M: Floats, dry: Floats, first: int | None = None
-) -> None:
-    """Raise ArgumentError where h f / (M s) is above `most` in any of n rollouts.
-
-    Over a slip speed s dry friction acts near rest like a damper f / s, so that a joint obeys
-    v' = v (1 - h f / (M s)): above 2 every step reverses and enlarges v, until friction jumps between f and
-    -f from step to step.
-
-    `M` (n, nv, nv) are mass matrices with armature, `dry` (n, nv) is dry friction; `first` is the number of
-    the first rollout, if there are several.
-    """
-    root = np.sqrt(dry * (h / slip))
-    try:
-        scaled = root[:, :, None] * np.linalg.inv(M) * root[:, None, :]
-        largest = np.linalg.eigvalsh(scaled)[:, -1]
-    except np.linalg.LinAlgError:
-        return
-    row = int(np.argmax(np.where(np.isfinite(largest), largest, -np.inf)))
-    ratio = float(largest[row])
-    if not ratio > most:
-        return
-    base = 6 if model.floating else 0
-    _, vectors = np.linalg.eigh(scaled[row])
-    joint = model.coordinate_names[int(np.argmax(np.abs(vectors[base:, -1])))]
-    where = joint if first is None else f"{joint} in rollout {first + row}"
-    raise ArgumentError(
-        f"friction_slip is {slip:g}, so small that dry friction oscillates from step to step: "
-        f"dt f / (M friction_slip) is {ratio:.3g} at {where}, and {most:g} is the largest stable value; give "
-        f"friction_slip {1.01 * slip * ratio / most:.3g} or more, a smaller dt, or friction_slip 0, with "
-        "which joints stick and slide at any dt"
-    )
+    refuse_unstable_slip(model, slip, h, M[None], dry[None], integrator)

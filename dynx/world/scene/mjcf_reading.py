@@ -22,7 +22,7 @@ from dynx.model.mjcf.reader import MjcfBody, MjcfTree, MjcfTrees, read_trees
 from dynx.model.mjcf.shapes import Geom
 from dynx.model.named_configurations import coordinates_of
 from dynx.model.package_search import StrPath
-from dynx.model.stated_configurations import NamedConfiguration
+from dynx.model.stated_parts import NamedConfiguration
 from dynx.model.xml.reading import Element
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
