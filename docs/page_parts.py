@@ -71,3 +71,8 @@ def conditions(seconds: float, load_before: float | None, libraries: Sequence[st
     busy = "" if load_before is None else f" (load average {load_before:.1f} before)"
     lasted = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} minutes"
     return f"*{date.today().isoformat()}, in {lasted}{busy}; {processor()}; {versions(libraries)}.*\n"
+
+
+def measured_before(day: date, libraries: Sequence[str] = LIBRARIES) -> str:
+    """Return the paragraph of `conditions` for results of an earlier run on this machine."""
+    return f"*Measured before this table was written, on {day}; {processor()}; {versions(libraries)}.*\n"

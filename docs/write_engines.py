@@ -2,6 +2,8 @@
 
     python -m docs.write_engines                 # every table, which takes ten minutes or more
     python -m docs.write_engines files speed     # these tables
+    python -m docs.write_engines contacts --documents one.json other.json
+                                                 # of runs of dynx contacts --json, each of other engines
 
 Each table has the command that measured it, the day, the processor and the versions beside it. The text
 between the tables is kept.
@@ -16,6 +18,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,7 +29,8 @@ import dynx
 from benchmarks.surveys.distance_engines import ENGINES as DISTANCE_ENGINES
 from benchmarks.surveys.distances import BLOCK, PLACEMENTS, Row, measure_block, shown
 from benchmarks.surveys.files import SMALL, Entry, make_tasks, survey
-from docs.page_parts import conditions, replaced, table, two_digits
+from docs.page_parts import conditions, measured_before, replaced, table, two_digits
+from docs.write_contacts import joined
 from docs.write_results import output_of
 from docs.write_results import shown as shown_command
 from dynx.bench.machine import load
@@ -263,17 +267,28 @@ def measured(name: str) -> str:
     return f"    {command(name)}\n\n{conditions(time.monotonic() - began, before)}\n{text}"
 
 
+def contacts_of_documents(documents: Sequence[Path]) -> str:
+    """Return the text of the part on contacts from documents of `dynx contacts --json`."""
+    report = joined([json.loads(each.read_text(encoding="utf-8")) for each in documents])
+    day = date.fromtimestamp(min(each.stat().st_mtime for each in documents))
+    return f"    {command('contacts')}\n\n{measured_before(day)}\n{contacts_tables(report)}"
+
+
 def main(arguments: Sequence[str]) -> None:
     """Measure the parts that are named, or all, and write the page."""
     parser = argparse.ArgumentParser(prog="python -m docs.write_engines", description=__doc__)
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"one of {', '.join(PARTS)}; default: all")
-    names = parser.parse_args(arguments).parts
+    parser.add_argument("--documents", nargs="+", type=Path, metavar="FILE", help="for the part contacts")
+    given = parser.parse_args(arguments)
+    names = given.parts
+    if given.documents and names != ["contacts"]:
+        parser.error("--documents are for the part contacts alone")
     unknown = [name for name in names if name not in PARTS]
     if unknown:
         parser.error(f"no part {', '.join(unknown)}; known are {', '.join(PARTS)}")
     for name in names or PARTS:
         print(f"{name} ...", file=sys.stderr, flush=True)
-        part = measured(name)
+        part = contacts_of_documents(given.documents) if given.documents else measured(name)
         PAGE.write_text(replaced(PAGE, PAGE.read_text(encoding="utf-8"), name, part), encoding="utf-8")
 
 
