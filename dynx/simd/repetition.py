@@ -338,24 +338,19 @@ class _PartBody(SegmentBody):
         inputs: Sequence[tuple[bool, int]],
         outputs: Sequence[tuple[bool, int]],
         is_step: bool,
-        at_once: bool,
+        results: Mapping[int, Sequence[int]],
     ) -> None:
         """`inputs` and `outputs` have for each port whether it is in memory, and the number of its array or
-        its first slot. Results in memory are written `at_once`, unless they replace values that are read.
-        Quotients by roots are correct to 2 ulp in a step."""
+        its first slot. `results` are the slots of nodes that are written at once: until the end of the code,
+        all would have to stay in registers or on the stack. Quotients by roots are correct to 2 ulp in a
+        step."""
         super().__init__(program, target, settings, segment, slots, number)
         self._sources, self._targets = inputs, outputs
         self._estimates_roots = is_step and target.estimates_roots and target.lanes == settings.lanes
         places = zip((*program.inputs, *program.outputs), (*inputs, *outputs), strict=True)
         self._rows = [Rows(self._write, port.size, partial(self._pointers, at)) for port, (_, at) in places]
         self._ages: dict[int, int] = {}
-        self._results: dict[int, list[int]] = {}
-        """Slots of results in memory that are written at once, by node. Until the end of the code, all would
-        have to stay in registers or on the stack."""
-        for (in_memory, place), (_, scalars) in zip(outputs, scalar_ranges(program.outputs), strict=True):
-            for slot, scalar in enumerate(scalars, place):
-                if in_memory and at_once:
-                    self._results.setdefault(program.results[scalar], []).append(slot)
+        self._results = results
 
     def _input(self, port: int, column: int) -> str:
         in_memory, place = self._sources[port]
@@ -372,7 +367,7 @@ class _PartBody(SegmentBody):
                 self._rows[len(self._program.inputs) + output].store_tile(columns.start, values)
                 continue
             for column, node in zip(columns, nodes, strict=True):
-                if node not in self._results or self._program.nodes[node].op in LEAVES:
+                if node not in self._results:
                     self._keep(self._value(node), place + column)
 
     def _compute(self, index: int) -> None:
@@ -413,18 +408,24 @@ def emit_repetition(repetition: Repetition, target: Processor, settings: Setting
     calls: list[list[int]] = []
     size = layout.size
     last = len(repetition.parts) - 1
+    results: dict[int, list[int]]
     for part, program in enumerate(repetition.parts):
         is_step = part % 2 == 1
-        segments = schedule(program, settings.lanes, settings.segment)
+        segments = schedule(program, settings.lanes, settings.segment, in_memory=part < last)
         check_schedule(program, segments, settings.lanes)
-        spilled = spill_slots(program, segments)
-        slots = {node: layout.size + slot for node, slot in spilled.items()}
-        size = max(size, layout.size + max(spilled.values(), default=-1) + 1)
         sources = list(_places(program.inputs, layout, repetition.inputs, arrays=not is_step))
         if part < last:
             targets = list(_places(program.outputs, layout, (), arrays=False))
         else:
             targets = [(False, len(repetition.inputs) + k) for k in range(len(program.outputs))]
+        # Results in memory are written at once, unless they replace values that are read.
+        results = _results(program, targets) if part < last and not is_step else {}
+        for segment in segments:
+            segment.spilled -= results.keys()
+        spilled = spill_slots(program, segments)
+        slots = {node: found[0] for node, found in results.items()}
+        slots |= {node: layout.size + slot for node, slot in spilled.items()}
+        size = max(size, layout.size + max(spilled.values(), default=-1) + 1)
         first = len(bodies)
         bodies += [
             _PartBody(
@@ -437,7 +438,7 @@ def emit_repetition(repetition: Repetition, target: Processor, settings: Setting
                 inputs=sources,
                 outputs=targets,
                 is_step=is_step,
-                at_once=part < last and not is_step,
+                results=results,
             ).text("")
             for k, segment in enumerate(segments)
         ]
@@ -446,6 +447,17 @@ def emit_repetition(repetition: Repetition, target: Processor, settings: Setting
     goes_on = [layout.slots[f"{_STATE}{k}.{GOES_ON}"] for k in range(len(repetition.steps))]
     loop = _loop(repetition, goes_on, calls, size, settings.lanes)
     return [_module(texts, target, settings) for texts in (*([body] for body in bodies), [*declared, loop])]
+
+
+def _results(program: Program, targets: Sequence[tuple[bool, int]]) -> dict[int, list[int]]:
+    """Return the slots of the computed results of a program, by node, from the first slot of each output."""
+    found: dict[int, list[int]] = {}
+    for (_, place), (_, scalars) in zip(targets, scalar_ranges(program.outputs), strict=True):
+        for slot, scalar in enumerate(scalars, place):
+            node = program.results[scalar]
+            if program.nodes[node].op not in LEAVES:
+                found.setdefault(node, []).append(slot)
+    return found
 
 
 def _places(

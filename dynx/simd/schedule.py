@@ -74,11 +74,12 @@ class Segment:
     """True if it stores constants in streamed rows (`dynx.simd.streaming`), and nothing else."""
 
 
-def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
+def schedule(program: Program, lanes: int, longest: int, *, in_memory: bool = False) -> list[Segment]:
     """Divide the program into segments of about half of `longest` operations; into one if it has at most
     `longest`.
 
-    A group of angles is never divided. Constants in streamed rows are stored by segments of their own.
+    A group of angles is never divided. Constants in streamed rows are stored by segments of their own. Stores
+    of results that stay `in_memory` are short, and never make a segment longer than it may be.
     """
     steps = list(_steps(program))
     if sum(operation_count(program, step) for step in steps) > longest:
@@ -101,7 +102,8 @@ def schedule(program: Program, lanes: int, longest: int) -> list[Segment]:
             segments[max((segment_of.get(node, 0) for node in store.nodes), default=0)].stores.append(store)
     if constants.stores:
         segments.append(constants)
-    segments = [part for segment in segments for part in _divide_stores(segment)]
+    if not in_memory:
+        segments = [part for segment in segments for part in _divide_stores(segment)]
     for number, segment in enumerate(segments):
         segment_of.update((node, number) for step in segment.steps for node in _computed_nodes(step))
     for number, segment in enumerate(segments):
