@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dynx.backends.base import Backend
-from dynx.backends.derived import DerivedBackend, native_quantities
 from dynx.backends.registry import (
     backend,
     backend_class,
@@ -34,4 +33,7 @@ __all__ = [
 
 # Hidden from type checkers, which would take any name for an attribute.
 if not TYPE_CHECKING:
-    __getattr__ = moved_names(__name__, {})
+    _DERIVED = dict.fromkeys(("DerivedBackend", "native_quantities"), "dynx.backends.derived")
+    __getattr__ = moved_names(__name__, {}, _DERIVED)
+else:
+    from dynx.backends.derived import DerivedBackend, native_quantities

@@ -13,7 +13,6 @@ from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.ik.options import IKOptions, Options, spells_options
 from dynx.ik.problem import SOLVERS, Problem, argument_note, checked_problem
-from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Search
 from dynx.model.numbers import checked_bool
@@ -218,7 +217,11 @@ def _result(found: list[Candidate], problem: Problem, backend: Backend) -> IKRes
     found = found + [Candidate.not_begun(q, len(problem.requirements)) for q in starts[begun:]]
     success = np.array([one.success for one in found], dtype=np.bool_).reshape(batch)
     unreached = ~success.reshape(-1) & (np.arange(problem.count) < begun)
-    proof = proofs(problem, backend.model, unreached).reshape(batch) if unreached.any() else None
+    proof = None
+    if unreached.any():
+        from dynx.ik.reach import proofs  # targets that are reached need none
+
+        proof = proofs(problem, backend.model, unreached).reshape(batch)
     timed_out = np.array([one.timed_out for one in found], dtype=np.bool_).reshape(batch)
     return IKResult(
         q=np.array([one.q for one in found], dtype=np.float64).reshape(*batch, backend.model.nq),

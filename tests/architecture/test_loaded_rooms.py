@@ -65,7 +65,7 @@ FLOWS = {
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
-        105,
+        101,
         19000,
     ),
     "simulate": Flow(
@@ -104,10 +104,10 @@ FLOWS = {
         "environment = gymnasium.make('dynx/CartPole-v0')\n"
         "environment.reset(seed=0)\n"
         "environment.step(environment.action_space.sample())",
-        ("distance", "ik", "world.camera", "steppers.camera"),
+        ("distance", "ik", "world.camera", "steppers.camera", "compiled", "simd"),
         (),
-        154,
-        28000,
+        112,
+        20700,
     ),
 }
 

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynx.backends.dynamics import Dynamics
-from dynx.compiled.array_dynamics import ArrayDynamics
 from dynx.envs.library import spaces
 from dynx.envs.task import RobotTask, State, camera_at, component_names, refuse_unknown_choice
 from dynx.errors import UnsupportedFeatureError
@@ -141,7 +140,10 @@ class Reach(RobotTask):
         return low, high
 
     @cached_property
-    def _arrays(self) -> ArrayDynamics:
+    def _arrays(self) -> Dynamics:
+        # The other tasks, which are registered with this one, need no compiler.
+        from dynx.compiled.array_dynamics import ArrayDynamics
+
         return ArrayDynamics(self.model)
 
     @cached_property
