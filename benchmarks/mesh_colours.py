@@ -39,8 +39,8 @@ from dynx.steppers.state import RobotState, WorldState
 from dynx.viewer import Viewer
 from dynx.viewer.export import Stage, picture_of
 from dynx.viewer.motion import motion_of_state
+from dynx.world import Scene, SceneRobot
 from dynx.world.camera import Picture, cast_rays, draw_picture
-from dynx.world.scene import Scene, SceneRobot
 from dynx.world.scenery import DARK, LIGHT, Scenery
 from tests.viewer.conftest import BROWSERS, PATIENCE, SOFTWARE
 

@@ -281,9 +281,8 @@ def open_scene(
     """Return the world of a scene, or its recorded motion for an export and for a comparison."""
     from dynx.steppers.registry import installed_worlds
     from dynx.viewer.motion import FRAME_RATE, MAX_FRAMES
-    from dynx.world import World
+    from dynx.world import World, read_scene
     from dynx.world.comparison import compare_engines
-    from dynx.world.scene import read_scene
 
     scene, step = read_scene(target), DEFAULT_STEP if dt is None else dt
     if export_path is None and not compare:

@@ -41,7 +41,7 @@ from dynx.files.writing import write_bytes
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.registry import installed_worlds
 from dynx.steppers.settings import Setting
-from dynx.world import World
+from dynx.world import Scene, World, body_to_urdf, read_scene, write_scene
 from dynx.world.comparison import (
     SEPARATIONS,
     ComparisonInterrupted,
@@ -50,7 +50,6 @@ from dynx.world.comparison import (
     compare_engines,
 )
 from dynx.world.mjcf import mjcf_remarks, scene_to_mjcf
-from dynx.world.scene import Scene, body_to_urdf, read_scene, write_scene
 from dynx.world.separation import Separation
 from dynx.world.snapshot import check_world_suffix
 

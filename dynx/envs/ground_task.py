@@ -20,7 +20,7 @@ from dynx.model import Model
 from dynx.spatial.scalar import Array, Floats
 
 if TYPE_CHECKING:
-    from dynx.world.scene import SceneRobot
+    from dynx.world import SceneRobot
     from dynx.world.world import World
 
 KERNEL_ENGINE = "dynx"

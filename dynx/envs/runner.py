@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from dynx.envs.ground_step import GroundContacts
     from dynx.envs.ground_task import GroundTask
     from dynx.envs.task_step import TaskStep
-    from dynx.world.scene import Scene
+    from dynx.world import Scene
     from dynx.world.snapshot import Snapshot
     from dynx.world.world import World
 
@@ -622,7 +622,7 @@ def _draw(
 
 
 def _scene_of_robot(task: RobotTask) -> Scene:
-    from dynx.world.scene import Scene, SceneRobot
+    from dynx.world import Scene, SceneRobot
 
     return Scene(type(task).__name__, robots=(SceneRobot(ROBOT, task.model),))
 

@@ -37,7 +37,7 @@ from dynx.steppers.settings import checked_switches
 if TYPE_CHECKING:
     from dynx.steppers.camera import Camera
     from dynx.steppers.state import WorldState
-    from dynx.world.scene import Scene
+    from dynx.world import Scene
     from dynx.world.world import World
 
 Kind = TypeVar("Kind", bound="Task")

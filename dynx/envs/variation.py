@@ -29,8 +29,8 @@ from dynx.steppers.layout import stop_positions
 if TYPE_CHECKING:
     from dynx.rbd.contact_step import FramedShape, ServoJoints
     from dynx.steppers.material import Material
+    from dynx.world import Scene, SceneBody, SceneRobot
     from dynx.world.motors import Motor
-    from dynx.world.scene import Scene, SceneBody, SceneRobot
 
 ROBOT_FIELDS = ("mass_scale", "payload", "joint_damping", "joint_friction", "delay")
 JOINT_FIELDS = ("joint_damping", "joint_friction")

@@ -30,8 +30,8 @@ from dynx.viewer.following import FollowingCamera
 from dynx.viewer.framing import SHARE, box_around, points_around
 from dynx.viewer.page import DEFAULT_HOST, Page
 from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
+from dynx.world import Scene
 from dynx.world.camera import part_poses
-from dynx.world.scene import Scene
 from dynx.world.scenery import DARK, LIGHT
 
 DEFAULT_RATE = 25.0

@@ -16,8 +16,8 @@ from dynx.steppers.camera import Camera
 from dynx.viewer.colours import css
 from dynx.viewer.motion import MotionFrames
 from dynx.viewer.page import Page
+from dynx.world import Scene, SceneRobot
 from dynx.world.camera import Picture, draw_frames
-from dynx.world.scene import Scene, SceneRobot
 
 KINDS = ("colours", "depth", "parts")
 """What a pane shows."""

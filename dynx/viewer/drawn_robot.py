@@ -35,7 +35,7 @@ from dynx.viewer.triangles import (
     turned_outwards,
     with_edges,
 )
-from dynx.world.scene import SceneBody
+from dynx.world import SceneBody
 from dynx.world.scenery import LIGHT, Scenery
 
 _STILL = 1e-12

@@ -17,7 +17,7 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.triangles import triangles_of
 
 if TYPE_CHECKING:
-    from dynx.world.scene import SceneBody
+    from dynx.world import SceneBody
 
 
 VIEW_DIRECTION = np.array([1.0, -1.0, 0.7]) / math.sqrt(2.49)

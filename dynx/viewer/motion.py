@@ -16,10 +16,10 @@ from dynx.rbd.kinematics import link_poses
 from dynx.sim import BatchRollouts, Rollout, ScenePlant
 from dynx.spatial.scalar import Floats
 from dynx.steppers.state import WorldState
+from dynx.world import Scene, SceneBody
 from dynx.world.camera import part_poses
 from dynx.world.comparison import EngineRun
 from dynx.world.record import Record, position_channel
-from dynx.world.scene import Scene, SceneBody
 from dynx.world.separation import Separation, separation
 
 FRAME_RATE = 60.0

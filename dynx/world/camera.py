@@ -30,7 +30,7 @@ from dynx.spatial.se3 import inverse
 from dynx.steppers.camera import Camera, Draw, Drawing, DrawnShape, DrawnTriangles
 from dynx.steppers.state import WorldState
 from dynx.world.boxes import shape_box
-from dynx.world.scene import Scene
+from dynx.world.scene.scene import Scene
 from dynx.world.scenery import (
     GAMMA,
     KEY_DIRECTION,

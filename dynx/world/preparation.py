@@ -25,10 +25,12 @@ from dynx.steppers.layout import (
     PlacedShape,
     RobotLayout,
 )
+from dynx.steppers.material import Material
 from dynx.steppers.settings import checked_switches
 from dynx.steppers.stepper import Feature, Stepper
-from dynx.world.scene import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld
-from dynx.world.scene.robots import LinkFrames
+from dynx.world.scene.bodies import PointToPoint, SceneBody, Weld
+from dynx.world.scene.robots import LinkFrames, SceneRobot
+from dynx.world.scene.scene import Scene
 
 MAX_COLLIDERS = 10_000
 """Largest number of links and bodies with shapes; the filter has an entry for each pair."""

@@ -23,7 +23,7 @@ from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper, TouchingPoint
 from dynx.world.boxes import OwnerPoses, collider_box, shape_box
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
-from dynx.world.scene import Scene
+from dynx.world.scene.scene import Scene
 
 
 class Distances:

@@ -29,9 +29,8 @@ from dynx.model.tree import Base
 from dynx.sim import simulate
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import Forces
-from dynx.world import World
+from dynx.world import Scene, SceneRobot, World
 from dynx.world.preparation import prepare
-from dynx.world.scene import Scene, SceneRobot
 from tests.backends.robots import mixed_robot
 from tests.sim.bars import PLANTS_AGREE, apart, tutorial_motion, tutorial_robot
 

@@ -16,8 +16,7 @@ from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
 from dynx.viewer import Viewer, view
 from dynx.viewer.moving_picture import MOVING
-from dynx.world import Material, Scene, World
-from dynx.world.scene import SceneRobot, box, ground
+from dynx.world import Material, Scene, SceneRobot, World, box, ground
 from tests.viewer.conftest import PICTURE, OpenPage, connected, pixel_of, until
 
 DARK_GREY = Material(rgba=(0.25, 0.25, 0.25, 1.0))

@@ -11,8 +11,7 @@ import dynx
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.model import Pose
 from dynx.viewer.camera_pane import depth_shades, part_colour, part_colours
-from dynx.world import Camera, Scene, World
-from dynx.world.scene import box, ground
+from dynx.world import Camera, Scene, World, box, ground
 from tests.viewer.conftest import OpenPage, connected, until
 
 CUBE = box("cube", (0.4, 0.4, 0.4), mass=1.0, pose=Pose((0.0, 0.0, 1.0)))

@@ -19,8 +19,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.viewer import Viewer
 from dynx.viewer.following import _BEFORE
-from dynx.world import World
-from dynx.world.scene import Material, Scene, SceneBody, SceneRobot, ground
+from dynx.world import Material, Scene, SceneBody, SceneRobot, World, ground
 from tests.viewer.conftest import PICTURE, OpenPage, connected, until
 
 ORANGE = Material(rgba=(1.0, 0.4, 0.0, 1.0))

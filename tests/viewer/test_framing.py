@@ -20,9 +20,8 @@ from dynx.viewer.export import stage_for
 from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitted_view, has_ground, round_length
 from dynx.viewer.motion import motion_of_robot, motion_of_state
 from dynx.viewer.triangles import resized, triangles_of
-from dynx.world import Scene, World
+from dynx.world import Scene, SceneRobot, World, box, ground, read_scene
 from dynx.world.camera import cast_rays, drawn_shapes
-from dynx.world.scene import SceneRobot, box, ground, read_scene
 from tests.conftest import EXAMPLES_INSTALLED, needs_examples
 
 

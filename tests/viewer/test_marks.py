@@ -14,8 +14,7 @@ from dynx.spatial.so3 import rotation_from_rpy
 from dynx.viewer.controls import slider_step
 from dynx.viewer.marks import centre_of, equivalent_solid
 from dynx.viewer.triangles import triangles_of
-from dynx.world import World
-from dynx.world.scene import read_scene
+from dynx.world import World, read_scene
 
 lengths = st.floats(0.01, 2.0)
 

@@ -24,9 +24,8 @@ from dynx.viewer.motion import (
 )
 from dynx.viewer.motion_view import Curves, MotionView, _power
 from dynx.viewer.page import Page
-from dynx.world import Scene, SceneRobot, box, ground
+from dynx.world import Scene, SceneRobot, box, ground, read_scene
 from dynx.world.comparison import compare_engines
-from dynx.world.scene import read_scene
 
 GOAL = [0.5, -0.4, 0.3, 0.2, -0.3, 0.4]
 

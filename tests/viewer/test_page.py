@@ -25,9 +25,8 @@ from dynx.steppers.state import RobotState, WorldState
 from dynx.viewer import Viewer, export, view
 from dynx.viewer.export import MAX_EMBEDDED
 from dynx.viewer.motion import PARTED, motion_separation
-from dynx.world import Scene, World
+from dynx.world import Scene, SceneRobot, World, box, ground, read_scene
 from dynx.world.camera import draw_picture
-from dynx.world.scene import SceneRobot, box, ground, read_scene
 from tests.conftest import needs_examples
 from tests.viewer.conftest import (
     PATIENCE,

@@ -17,8 +17,7 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer import view
 from dynx.viewer.browser import HOVERED
 from dynx.viewer.marks import CORNERS, arranged, overlap, rectangle, seen_by
-from dynx.world import World
-from dynx.world.scene import read_scene
+from dynx.world import World, read_scene
 from tests.viewer.conftest import PICTURE, Opened, OpenPage, antialiased, connected, pixel_of, until
 
 MESSAGE = 160.0

@@ -14,8 +14,7 @@ from dynx.errors import ArgumentError
 from dynx.model import Pose
 from dynx.viewer.export import MAX_PICTURES, PICTURES_PER_SECOND
 from dynx.viewer.recording import LONGEST, FilmRecorder
-from dynx.world import Scene, World
-from dynx.world.scene import box, ground
+from dynx.world import Scene, World, box, ground
 from tests.viewer.conftest import PICTURE, OpenPage, connected
 
 CUBE = box("cube", (0.4, 0.4, 0.4), mass=1.0, pose=Pose((0.0, 0.0, 1.0)))

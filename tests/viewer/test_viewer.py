@@ -20,8 +20,7 @@ from dynx.model import Model
 from dynx.model.tree import Base
 from dynx.viewer import Viewer, view
 from dynx.viewer.colours import NAMED, RGB
-from dynx.world import World
-from dynx.world.scene import read_scene
+from dynx.world import World, read_scene
 from tests.conftest import EXAMPLES_INSTALLED, needs_examples
 from tests.viewer.conftest import poses_of_nodes, until
 

@@ -13,8 +13,7 @@ import dynx
 from dynx.errors import ArgumentError, DynxError
 from dynx.model import Pose
 from dynx.viewer.world_view import _NO_PART_CHOSEN, Pull
-from dynx.world import ExternalForce, Scene, World, box, ground
-from dynx.world.scene import SceneRobot, read_scene
+from dynx.world import ExternalForce, Scene, SceneRobot, World, box, ground, read_scene
 from tests.viewer.conftest import until
 
 

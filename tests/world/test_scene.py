@@ -137,3 +137,8 @@ def test_bodies_of_one_shape_are_made_by_their_names(tmp_path: Path) -> None:
     assert ellipsoid("e", (0.1, 0.2, 0.3), mass=2.0).shapes[0].shape == Ellipsoid((0.1, 0.2, 0.3))
     file = str(tmp_path / "thing.stl")
     assert mesh("m", file, (1.0, 1.0, -1.0)).shapes[0].shape == Mesh(file, (1.0, 1.0, -1.0))
+
+
+def test_the_parts_of_scenes_have_one_door() -> None:
+    with pytest.raises(ImportError, match=r"dynx\.world\.scene\.box is now dynx\.world\.box"):
+        from dynx.world.scene import box  # type: ignore[attr-defined]  # noqa: F401

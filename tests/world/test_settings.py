@@ -19,6 +19,7 @@ from dynx.world import (
     Material,
     PointToPoint,
     Scene,
+    SceneRobot,
     Weld,
     World,
     WorldState,
@@ -27,7 +28,6 @@ from dynx.world import (
     ground,
     read_scene,
 )
-from dynx.world.scene import SceneRobot
 from tests.world.engines import WORLDS
 
 PAGE = (Path(__file__).parents[2] / "docs/reference/worlds.md").read_text(encoding="utf-8")

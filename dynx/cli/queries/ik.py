@@ -26,7 +26,7 @@ from dynx.ik import IKSolutions, closed_form
 from dynx.ik.result import TIMED_OUT
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
-from dynx.world.scene import read_scene
+from dynx.world import read_scene
 from dynx.world.scene.scene import MARGIN
 
 

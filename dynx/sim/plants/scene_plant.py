@@ -11,7 +11,7 @@ from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
 from dynx.steppers.registry import world_class
 from dynx.steppers.settings import checked_settings
-from dynx.world.scene import Scene, SceneRobot
+from dynx.world import Scene, SceneRobot
 
 
 @checks_types

@@ -21,9 +21,8 @@ from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import EngineCommand, ExternalForce, Forces
 from dynx.steppers.registry import world_class
 from dynx.steppers.state import WorldState
-from dynx.world import Contact, World
+from dynx.world import Contact, Scene, SceneRobot, World
 from dynx.world.last_step import MeanAcceleration
-from dynx.world.scene import Scene, SceneRobot
 from dynx.world.snapshot import Snapshot
 from dynx.world.surroundings import ContactTable, Surroundings
 

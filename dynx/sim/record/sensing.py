@@ -15,8 +15,8 @@ from dynx.sim.scenario.scenario import Scenario
 from dynx.sim.setup import refuse_unknown
 from dynx.spatial.scalar import Floats
 from dynx.steppers.layout import Layout
+from dynx.world import Scene
 from dynx.world.preparation import prepare
-from dynx.world.scene import Scene
 from dynx.world.sensing import SceneInstants, SceneMotion, parts_of, require_shapes
 from dynx.world.sensors.kinds import ContactSensor, RaySensor
 from dynx.world.sensors.motion import RobotMotion, SensedMotion

@@ -30,7 +30,7 @@ from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.controller_checks import controller_numbers
 from dynx.trajectory.base import Trajectory
-from dynx.world.scene import Scene
+from dynx.world import Scene
 
 MAX_WORDS_LENGTH = 80
 """Largest number of characters of a value in a message."""

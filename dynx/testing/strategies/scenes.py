@@ -35,8 +35,8 @@ from dynx.spatial.scalar import Floats
 from dynx.testing.strategies.configurations import configurations, velocities
 from dynx.testing.strategies.geometry import Strategy, numbers, poses, vectors
 from dynx.testing.strategies.models import models, optional
+from dynx.world import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld
 from dynx.world.boxes import Corners, shape_box
-from dynx.world.scene import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld
 from dynx.world.scene.robots import LinkFrames
 
 # Places of the parts of a scene: columns along x, in which each part stands above the one before it.

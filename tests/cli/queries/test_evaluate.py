@@ -22,7 +22,7 @@ from dynx.model.loading import load
 from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.rbd.parameters import Payload, plant_model
 from dynx.spatial.so3 import quat_from_rotation, rpy_from_rotation
-from dynx.world.scene import read_scene
+from dynx.world import read_scene
 from dynx.world.scene.scene import MARGIN
 from tests.conftest import EXAMPLES_INSTALLED
 from tests.oracles.closed_form import MODELS

@@ -15,8 +15,7 @@ from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, Robo
 from dynx.model.geometry import Mesh, Visual, solid_properties
 from dynx.model.geometry.convex_pieces import convex_decomposition, mesh_objects
 from dynx.steppers.registry import installed_worlds
-from dynx.world import World
-from dynx.world.scene import Scene, SceneBody
+from dynx.world import Scene, SceneBody, World
 from tests.model.geometry.mesh_files import stl
 
 SIGNS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])

@@ -18,8 +18,7 @@ from dynx.model.geometry.links import Colour
 from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
 from dynx.steppers.registry import installed_worlds
-from dynx.world import World
-from dynx.world.scene import Scene, SceneBody, SceneRobot
+from dynx.world import Scene, SceneBody, SceneRobot, World
 from tests.conftest import needs_examples
 
 SHARES = st.integers(0, 255).map(lambda value: value / 255.0)
