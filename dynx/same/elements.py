@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import combinations, islice
+from itertools import chain, combinations, islice
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -21,8 +21,9 @@ from dynx.model.stated_parts import NamedConfiguration
 from dynx.model.topology import resolve_mimics
 from dynx.same.decimals import decimals, fifty_digits, rounded
 from dynx.same.fit import BodyFit, Fit, angle_of, drive, fit
-from dynx.same.matching import UNCHANGED, BodyPair, Matching, MatchingPlan
+from dynx.same.matching import MIN_TOLERANCE, UNCHANGED, BodyPair, Matching, MatchingPlan
 from dynx.same.observability import observability_of
+from dynx.same.placement import count_misplaced
 from dynx.same.registration import principal_frames
 from dynx.same.scales import inertia_ratio
 from dynx.same.skeleton import (
@@ -201,16 +202,34 @@ def _with_fixed_joints(
             best.fit.theirs.body_of[each.theirs] == ROOT for each in best.elements if each.tag == "link"
         )
         base = None if any(at_root) else rounded(best.fit.bodies[0].D)
-        for each in islice(_fixed_joints(best, ours.model, tried), MAX_TRIALS):
+        misplaced = _misplaced(best, tolerance)
+        joints = _fixed_joints(best, ours.model, tried, any_single=misplaced > 0)
+        if misplaced:
+            joints = chain(joints, _own_joints(best, tried))
+        for each in islice(joints, MAX_TRIALS):
             placed = apply(changed, each.changes)
             trials.append((_analysed(ours, placed, [*known, each], tolerance, base), each, placed))
         found = min(trials, key=lambda trial: trial[0].cost, default=None)
-        if found is None or found[0].cost >= best.cost:
+        if found is None or round(found[0].cost - best.cost, 6) > 0.0:
             break
+        if round(found[0].cost - best.cost, 6) == 0.0:
+            # What explains as much is a better explanation if more stands at its place then.
+            equal = [trial for trial in trials if trial[0].cost == found[0].cost]
+            counts = [_misplaced(analysis, tolerance) for analysis, _, _ in equal] if misplaced else [0]
+            if min(counts) >= misplaced:
+                break
+            found = equal[counts.index(min(counts))]
         best, element, changed = found
         known = [*known, element]
         tried.add(element.theirs)
     return best
+
+
+def _misplaced(analysis: Analysis, tolerance: float) -> int:
+    """Count what stands at another place, if an element differs that may as well be another one."""
+    if not any(each.part in ("inertial", "origin") for each in analysis.elements):
+        return 0
+    return count_misplaced(analysis.fit, max(tolerance, MIN_TOLERANCE))
 
 
 def _analysed(
@@ -232,9 +251,15 @@ def _analysed(
     return Analysis(found, tuple(elements), unseen)
 
 
-def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[DifferingElement]:
+def _fixed_joints(
+    analysis: Analysis, ours: Model, tried: set[str], *, any_single: bool
+) -> Iterator[DifferingElement]:
     """Yield fixed joints of `theirs`, in document order, below which elements differ, each placed so that the
-    first joint or the first inertia of these does not."""
+    first joint or the first inertia of these does not.
+
+    With `any_single` those below which a single element differs are among them, whatever is written: then
+    what else stands at its place decides.
+    """
     found = analysis.fit
     model = found.theirs.model
     above = {joint.child: joint for joint in model.joints}
@@ -269,58 +294,99 @@ def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[
         if not (joint.moves or joint.name in tried)
         and not (joint.name in mine and are_alike(mine[joint.name].origin, joint.origin))
     ]
-    # Where the joint of a body is written as in the other description, a fixed joint in the body is at fault.
-    unlikely = {found.theirs.number[each.theirs] for each in analysis.elements if _is_unlikely(model, each)}
-    for joint in written_otherwise:
-        body = found.theirs.body_of[joint.child]
-        if body in unlikely:
+    # Where a fixed joint in a body is at fault, the joint of the body may be where it was; first the joints
+    # that are written as in the other description.
+    places = [each for each in analysis.elements if _is_place_that_moves(model, each)]
+    for unchanged in (True, False):
+        misplaced = {found.theirs.number[each.theirs] for each in places if each.unchanged == unchanged}
+        for joint in written_otherwise:
+            body = found.theirs.body_of[joint.child]
+            if body not in misplaced:
+                continue
             with fifty_digits():
-                displacement = _from_followed(found, body)
-            other = _placed(found, mine.get(joint.name), joint, displacement)
-            if other is not None:
-                yield other
+                followed = _followed(found, body)
+                off = inverse(followed) @ next(each.D for each in found.bodies if each.theirs == body)
+                displacements = [off]
+                for element in below.get(joint.name, [])[:1]:
+                    displacements += _displacements(found, joint, element, followed)
+            for displacement in displacements:
+                other = _placed(found, mine.get(joint.name), joint, displacement)
+                if other is not None:
+                    yield other
     for joint in [joint for joint in model.joints if joint.name in below and joint.name not in tried]:
         # What is written as in the other description is not at fault; what has no counterpart there may be
         # if several elements, or the place of a joint, depend on it.
         # A single element below it that is written otherwise is as good an explanation.
         elements = below[joint.name]
         if joint.name in mine:
-            several = len(elements) > 1 or elements[0].unchanged
+            several = len(elements) > 1 or elements[0].unchanged or any_single
             suspect = several and not are_alike(mine[joint.name].origin, joint.origin)
         else:
-            suspect = elements[0].tag == "joint" or len(elements) > 1
+            suspect = elements[0].tag == "joint" or len(elements) > 1 or any_single
         if suspect:
             yield from placed(joint, elements, beside=False)
     # The frame of a body may be chosen for what is below a fixed joint: all else in the body differs then, as
     # may its own joint, or a floating base.
     several = sum(each.theirs not in tried for each in analysis.elements) > 1
-    for joint in written_otherwise if several else []:
+    for joint in written_otherwise if several or any_single else []:
         elements = in_body.get(found.theirs.body_of[joint.child], [])
         if elements and joint.name not in below:
             yield from placed(joint, elements, beside=True)
 
 
-def _is_unlikely(model: Model, element: DifferingElement) -> bool:
-    """Check whether an element is the place of a joint that moves and is written as in the other robot."""
-    is_place = element.tag == "joint" and element.part == "origin"
-    return is_place and element.unchanged and model.joint(element.theirs).moves
+def _own_joints(analysis: Analysis, tried: set[str]) -> Iterator[DifferingElement]:
+    """Yield the joints that move the bodies of which an inertia or the place of a joint differs, each placed
+    so that it does not."""
+    found = analysis.fit
+    fits = {each.theirs: each for each in found.bodies}
+    differing = {each.theirs for each in analysis.elements} | tried
+    for element in analysis.elements:
+        if element.part not in ("inertial", "origin"):
+            continue
+        link = element.theirs
+        if element.tag == "joint":
+            if not found.theirs.model.joint(link).moves:
+                continue
+            link = found.theirs.model.joint(link).parent
+        body = found.theirs.body_of[link]
+        if body == ROOT or found.theirs.kinds[body] == "ball":
+            # What turns on a ball joint is turned as it fits best.
+            continue
+        joint, each = found.theirs.joints[body], fits[body]
+        if joint.name in differing:
+            continue
+        parent = fits[found.theirs.bodies[body].parent]
+        with fifty_digits():
+            for displacement in _displacements(found, joint, element):
+                D = each.D @ displacement
+                off = inverse(parent.D @ found.theirs.exact[body]) @ found.ours.exact[each.ours] @ D
+                turn, shift = angle_of(off), float(np.linalg.norm(rounded(off[:3, 3])))
+                if max(turn, shift / found.ours.reach) >= SNAP:
+                    yield _origin(found, replace(each, D=D, turn=turn, shift=shift), parent)
 
 
-def _from_followed(found: Fit, body: int) -> Array:
-    """Return the pose (4, 4) of the frame of a body in the frame that it has if its own joint is right."""
+def _is_place_that_moves(model: Model, element: DifferingElement) -> bool:
+    """Check whether an element is the place of a joint that moves."""
+    return element.tag == "joint" and element.part == "origin" and model.joint(element.theirs).moves
+
+
+def _followed(found: Fit, body: int) -> Array:
+    """Return the pose D (4, 4) that the frame of a body has if its own joint is right."""
     fits = {each.theirs: each for each in found.bodies}
     each, parent = fits[body], fits[found.theirs.bodies[body].parent]
-    followed = inverse(found.ours.exact[each.ours]) @ parent.D @ found.theirs.exact[body]
-    return inverse(followed) @ each.D
+    return inverse(found.ours.exact[each.ours]) @ parent.D @ found.theirs.exact[body]
 
 
-def _displacements(found: Fit, joint: Joint, element: DifferingElement) -> Iterator[Array]:
-    """Yield the displacements (4, 4), in the body of a fixed joint, that make another element below it right:
-    of a link both by its frame and by its inertia, in case its frame is moved."""
+def _displacements(
+    found: Fit, joint: Joint, element: DifferingElement, D: Array | None = None
+) -> Iterator[Array]:
+    """Yield the displacements (4, 4), in the body of a joint, that make another element below it right: of a
+    link both by its frame and by its inertia, in case its frame is moved. The frame of the body has the pose
+    D (4, 4), by default that of the fit."""
     ours, theirs = found.ours, found.theirs
     fits = {each.theirs: each for each in found.bodies}
     here = fits[theirs.body_of[joint.child]]
-    back = inverse(here.D)
+    back = inverse(here.D if D is None else D)
     if element.tag == "joint":
         each = fits[theirs.number[element.theirs]]
         yield back @ ours.exact[each.ours] @ each.D @ inverse(theirs.exact[each.theirs])

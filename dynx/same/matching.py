@@ -141,35 +141,36 @@ class Matching:
             return self._chosen(ROOT, ROOT, np.eye(4), 0.0)
         if self.base is not None:
             return self._chosen(ROOT, ROOT, self.base, 0.0)
-        found: list[tuple[float, int, Floats]] = []
+        found: list[tuple[float, int, int, Floats]] = []
         # A root without mass looks the same in any frame.
         unmoved = float(self.ours.inertias[ROOT].mass) > 0.0 and self._is_unmoved(ROOT, ROOT)
         unmoved = unmoved and not self._fits_turned(ROOT, ROOT)
         bases = [np.eye(4)] if unmoved else self._candidates_of(ROOT, ROOT)
         for number, D in enumerate(bases):
             limit = found[MAX_BASES - 1][0] if len(found) >= MAX_BASES else np.inf
-            count = self._followed(ROOT, ROOT, D, limit)
+            count = self._followed(ROOT, ROOT, D, limit + HALF)
             if count == 0.0 and not self._has_same_total(D):
                 # Each body fits but for what may belong to its parent; the root has not got it.
                 count = HALF
-            found = sorted([*found, (count, number, D)], key=_first_two)
+            # Of bases that explain as much, those in which more shapes are where they were.
+            shapes = self._misplaced_shapes(ROOT, ROOT, D) if count <= limit else 0
+            found = sorted([*found, (count, shapes, number, D)], key=_first_three)
             # The frame as it is stays in the choice, and the first in which the base itself fits: below a
             # misplaced joint all differs, in any frame.
-            kept = [entry for entry in found[MAX_BASES:] if entry[1] == 0]
-            fitting = (entry for entry in found if self._own_cost(ROOT, ROOT, entry[2]) == 0.0)
-            kept += [entry for entry in islice(fitting, 1) if entry[1] and entry not in found[:MAX_BASES]]
+            kept = [entry for entry in found[MAX_BASES:] if entry[2] == 0]
+            fitting = (entry for entry in found if self._own_cost(ROOT, ROOT, entry[3]) == 0.0)
+            kept += [entry for entry in islice(fitting, 1) if entry[2] and entry not in found[:MAX_BASES]]
             found = [*found[:MAX_BASES], *kept]
-            if found[0][0] == 0.0:
+            if found[0][:2] == (0.0, 0):
                 break
-        if found[0][0] <= HALF or found[0][1] == 0:
+        if found[0][0] <= HALF or found[0][2] == 0:
             found = found[:1]
-        best = self._chosen(ROOT, ROOT, found[0][2], 0.0)
-        # Of bases that explain as much, the one in which more shapes are where they were.
-        shapes = self._misplaced_shapes(found[0][2]) if len(found) > 1 else 0
-        for _, _, D in found[1:]:
+        best = self._chosen(ROOT, ROOT, found[0][3], 0.0)
+        shapes = self._misplaced_shapes(ROOT, ROOT, found[0][3]) if len(found) > 1 else 0
+        for _, _, _, D in found[1:]:
             bound = round(self._bound(ROOT, ROOT, D), 6), 0
             if bound < best.rank or (bound == best.rank and shapes):
-                plan, other = self._chosen(ROOT, ROOT, D, 0.0), self._misplaced_shapes(D)
+                plan, other = self._chosen(ROOT, ROOT, D, 0.0), self._misplaced_shapes(ROOT, ROOT, D)
                 if (plan.rank, other) < (best.rank, shapes):
                     best, shapes = plan, other
         return best
@@ -180,11 +181,10 @@ class Matching:
         whole = self.ours.whole
         return inertia_ratio(subtract(mine, transformed(other, D)), mine, whole) <= self.tolerance
 
-    def _misplaced_shapes(self, D: Floats) -> int:
-        """Count the shapes of floating bases with the frames D that have no equal."""
+    def _misplaced_shapes(self, a: int, b: int, D: Floats) -> int:
+        """Count the shapes of two bodies with the frames D that have no equal."""
         found = [
-            matched_shapes(kind, self.ours, self.theirs, ROOT, ROOT, D, self.tolerance)
-            for kind in SHAPE_KINDS
+            matched_shapes(kind, self.ours, self.theirs, a, b, D, self.tolerance) for kind in SHAPE_KINDS
         ]
         return sum(len(each.first) + len(each.second) for each in found)
 
@@ -265,29 +265,31 @@ class Matching:
         places = [(followed[:3, 3], 0.0)]
         if float(np.linalg.norm(followed[:3, 3])) > self.tolerance * self.length:
             places.append((np.zeros(3), _cost(self._has_equal_origins(a, b))))
-        best: MatchingPlan | None = None
+        best: tuple[tuple[float, int], int, MatchingPlan] | None = None
         for p, extra in places:
-            found: list[tuple[float, int, Floats]] = []
+            found: list[tuple[float, int, int, Floats]] = []
             at = homogeneous(followed[:3, :3], p)
             for number, D in enumerate(self._free_frames(a, b, at)):
                 limit = found[MAX_BASES - 1][0] if len(found) >= MAX_BASES else np.inf
-                found.append((self._followed(a, b, D, limit), number, D))
-                found = sorted(found, key=_first_two)[:MAX_BASES]
-                if found[0][0] == 0.0:
+                count = self._followed(a, b, D, limit + HALF)
+                # Of frames that explain as much, those in which more shapes are where they were.
+                shapes = self._misplaced_shapes(a, b, D) if count <= limit else 0
+                found = sorted([*found, (count, shapes, number, D)], key=_first_three)[:MAX_BASES]
+                if found[0][:2] == (0.0, 0):
                     break
-            for count, number, D in found:
+            for count, shapes, number, D in found:
                 if best is not None and len(self._plans) > MAX_PLANS:
                     break
                 if number == 0 and extra == 0.0:
                     plan = self._subtree(a, b, D)
                 else:
                     plan = self._chosen(a, b, D, extra)
-                if best is None or plan.rank < best.rank:
-                    best = plan
+                if best is None or (plan.rank, shapes) < best[:2]:
+                    best = plan.rank, shapes, plan
                 if count == 0.0:
                     break
         assert best is not None
-        return best
+        return best[2]
 
     def _chosen(self, a: int, b: int, D: Floats, extra: float) -> MatchingPlan:
         plan = self._subtree(a, b, D)
@@ -337,12 +339,13 @@ class Matching:
         """Yield the frames that body b may have in body a, but `followed`, with the number of elements that
         differ of the bodies themselves; with the place of the joint it is below `limit`.
 
-        Those are first below which the fewest elements differ if all frames follow. Those with `SLACK` more
-        than the first are left out, unless the bodies themselves fit: below a right frame a misplaced joint
-        is one element, but nothing fits that follows from it.
+        Those are first below which the fewest elements differ if all frames follow, and of these the ones in
+        which the body has the inertia of its counterpart: what may belong to its parent need not be there.
+        Those with `SLACK` more than the first are left out, unless the bodies themselves fit: below a right
+        frame a misplaced joint is one element, but nothing fits that follows from it.
         """
         own = self._own_cost(a, b, followed)
-        found: list[tuple[float, int, Floats, float]] = []
+        found: list[tuple[float, bool, int, Floats, float]] = []
         fewest = np.inf
         for D in chain([np.eye(4)], self._aligned(a, b, followed), self._candidates_of(a, b)):
             # A frame in which the body itself fits worse than before is not that of the body.
@@ -352,13 +355,14 @@ class Matching:
             if float(np.max(np.abs(D - followed))) <= SAME_FRAME:
                 continue
             count = self._followed(a, b, D, fewest + SLACK)
-            if count == 0.0:
+            exchanged = not self._has_whole_inertia(a, b, D)
+            if count == 0.0 and not exchanged:
                 yield D, cost
                 return
             if count <= fewest + SLACK or cost == 0.0:
-                found.append((count, len(found), D, cost))
+                found.append((count, exchanged, len(found), D, cost))
                 fewest = min(fewest, count)
-        for count, _, D, cost in sorted(found, key=_first_two):
+        for count, _, _, D, cost in sorted(found, key=_first_three):
             if count <= fewest + SLACK or cost == 0.0:
                 yield D, cost
 
@@ -646,14 +650,20 @@ class Matching:
         mine = self.ours.inertias[a]
         if self._has_other_center(a, b, D):
             return False
-        difference = subtract(mine, transformed(self.theirs.inertias[b], D))
-        if inertia_ratio(difference, mine, self.ours.whole) <= self.tolerance:
+        if self._has_whole_inertia(a, b, D):
             return True
         if a == ROOT or self._has_equal_inertials(a, b):
             # What is written alike and differs here is in another frame.
             return False
+        difference = subtract(mine, transformed(self.theirs.inertias[b], D))
         unshared = self.ours.unshared(a, difference)
         return inertia_ratio(unshared, mine, self.ours.whole) <= self.tolerance
+
+    def _has_whole_inertia(self, a: int, b: int, D: Floats) -> bool:
+        """Check whether two bodies have the same inertia."""
+        mine = self.ours.inertias[a]
+        difference = subtract(mine, transformed(self.theirs.inertias[b], D))
+        return inertia_ratio(difference, mine, self.ours.whole) <= self.tolerance
 
     def _has_other_center(self, a: int, b: int, D: Floats) -> bool:
         """Check whether mass or first moment differ already, which takes a tenth of the time of all."""
@@ -683,6 +693,10 @@ class Matching:
 
 def _first_two(entry: tuple[Any, ...]) -> tuple[float, int]:
     return entry[0], entry[1]
+
+
+def _first_three(entry: tuple[Any, ...]) -> tuple[float, int, int]:
+    return entry[0], entry[1], entry[2]
 
 
 def _is_identity(T: Floats) -> bool:

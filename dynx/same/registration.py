@@ -15,6 +15,7 @@ import numpy as np
 from dynx.model.mechanism import ROOT
 from dynx.same.arrangement import arrangements
 from dynx.same.decimals import rounded
+from dynx.same.shapes import SHAPE_KINDS, frames_of_shapes
 from dynx.same.skeleton import Skeleton
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
@@ -55,8 +56,10 @@ def candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int, depth: int = 0)
     if free and depth == 0:
         for pairs in islice(_pairings(ours, theirs, a, b), 1):
             yield from arrangements(ours, theirs, pairs)
-    if depth >= MAX_DEPTH or (not free and depth == 0):
-        # Only the frame of a floating root, or of a body on a ball joint, follows from no other.
+    massless = not float(ours.inertias[a].mass) > 0.0
+    if depth >= MAX_DEPTH or (depth == 0 and not (free or massless)):
+        # Only the frame of a floating root, or of a body on a ball joint, follows from no other; that of a
+        # body without mass follows from what it carries.
         return
     for i, j in _children(ours, theirs, a, b):
         if ours.kinds[i] == "ball":
@@ -158,6 +161,8 @@ def _own_candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterato
         mine = named.get(theirs.model.links[k].name)
         if mine is not None:
             yield rounded(ours.link_pose(mine)) @ inverse(rounded(theirs.link_pose(k)))
+    if is_free(ours, a):
+        yield from _candidates_of_links(ours, theirs, a, b)
     pairs = [(ours.inertias[a], theirs.inertias[b])]
     if is_free(ours, a):
         # The centre of mass moves where a part of the inertia is stated in another body.
@@ -168,6 +173,20 @@ def _own_candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterato
             for mine_frame in mine_frames[:1]:
                 for their_frame in their_frames:
                     yield mine_frame @ inverse(their_frame)
+
+
+def _candidates_of_links(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterator[Floats]:
+    """Yield the frames of which a link of one name, with mass or a shape, is where it is in the other robot:
+    where a link of the body is misplaced, that of another one is right."""
+    mine, others = ours.heavy_links[a], theirs.heavy_links[b]
+    if len(mine) > 1:
+        for name in (each for each in mine if each in others):
+            inertias = mine[name], others[name]
+            if all(float(each.mass) > 0.0 for each in inertias):
+                (frame, *_), _ = principal_frames(inertias[0])
+                yield from (frame @ inverse(each) for each in principal_frames(inertias[1])[0])
+    for kind in SHAPE_KINDS:
+        yield from frames_of_shapes(kind, ours, theirs, a, b)
 
 
 def _frames(skeleton: Skeleton, body: int, inertia: RigidInertia) -> Iterator[list[Floats]]:
@@ -195,6 +214,10 @@ def _frames(skeleton: Skeleton, body: int, inertia: RigidInertia) -> Iterator[li
         yield principal
         lines += [(center, axis) for axis in symmetric]
     lines += list(_lines_of_slides(skeleton, body, center))
+    if body != ROOT and skeleton.kinds[body] == "prismatic":
+        # Its direction, through a point that the body has.
+        points = [line[0] for line in lines[:1]] if center is None else [center]
+        lines += [(point, skeleton.axes[body]) for point in points]
     lines += list(_lines_of_centers(skeleton, body, center))
     for line in lines:
         yield [] if center is None else _frames_of_point(line, center)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Literal, get_args
@@ -16,6 +17,7 @@ from dynx.same.decimals import rounded
 from dynx.same.skeleton import Skeleton
 from dynx.same.text import vector_text
 from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.se3 import inverse
 
 ShapeKind = Literal["collision shapes", "visual shapes"]
 
@@ -26,6 +28,10 @@ DIGITS = 12
 
 NEGLIGIBLE = 1e-12
 """Distance [m] or angle [rad] below which two frames are the same."""
+
+
+ROUNDED = 1e-6
+"""Relative difference of the sizes of two shapes that may be rounding of a file."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +45,15 @@ class ShapeOfBody:
     T: Floats
     words: str
 
-    def equals(self, other: ShapeOfBody, tolerance: float, length: float) -> bool:
-        """Check whether two shapes differ by at most `tolerance` of their sizes, of `length` and of 1 rad."""
+    def is_as_large(self, other: ShapeOfBody, tolerance: float) -> bool:
+        """Check whether two shapes are of one kind, with sizes that differ by at most `tolerance` of them."""
         if self.kind != other.kind or self.sizes.shape != other.sizes.shape:
             return False
-        if np.any(np.abs(self.sizes - other.sizes) > tolerance * np.abs(self.sizes)):
+        return not np.any(np.abs(self.sizes - other.sizes) > tolerance * np.abs(self.sizes))
+
+    def equals(self, other: ShapeOfBody, tolerance: float, length: float) -> bool:
+        """Check whether two shapes differ by at most `tolerance` of their sizes, of `length` and of 1 rad."""
+        if not self.is_as_large(other, tolerance):
             return False
         apart = np.abs(self.T - other.T)[:3]
         return bool(np.max(apart[:, :3]) <= tolerance and np.max(apart[:, 3]) <= tolerance * length)
@@ -74,6 +84,19 @@ def matched_shapes(
             pairs.append((shape, same))
             left = [other for other in left if other is not same]
     return MatchedShapes(pairs, alone, left)
+
+
+def frames_of_shapes(kind: ShapeKind, ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterator[Floats]:
+    """Yield the poses (4, 4) that the frame of body b has in that of body a where the first shape of a link
+    stands where the first one of its namesake does, if both are alike."""
+    firsts = [
+        {each.number[0]: each for each in reversed(_shapes(kind, skeleton, body, np.eye(4))) if each.number}
+        for skeleton, body in ((ours, a), (theirs, b))
+    ]
+    for name, mine in firsts[0].items():
+        other = firsts[1].get(name)
+        if other is not None and mine.is_as_large(other, ROUNDED):
+            yield mine.T @ inverse(other.T)
 
 
 def _shapes(kind: ShapeKind, skeleton: Skeleton, body: int, D: Floats) -> list[ShapeOfBody]:

@@ -1,0 +1,107 @@
+"""A joint at another place is named, and not the inertia that stands at another place with it.
+
+Where the frame of a link is moved too, its inertia is written otherwise, and another inertia of that link
+explains the dynamics as well. The shapes of the link say that it is the link which stands elsewhere.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from dynx.model import Model
+from dynx.model.elements import Joint, JointType, Limits, Link, Pose
+from dynx.same import same_robot
+from dynx.spatial.se3 import homogeneous, inverse
+from dynx.spatial.so3 import quat_from_rotation
+from tests.same.planted import with_joint
+from tests.same.rewrites import random_rotation, with_moved_frames
+from tests.same.test_named_elements import above, names, picked, random_inertial
+
+QUICK = settings(
+    max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much]
+)
+SEEDS = st.integers(0, 10_000)
+SIZES = st.floats(-6.0, -1.0).map(lambda exponent: 10.0**exponent)
+SIDES = "0.3 0.2 0.1"
+
+
+def tree(rng: np.random.Generator, floating: bool, balls: bool) -> Model:
+    """Return a tree of 5 to 8 links with mass; with `balls` the second link is on a ball joint."""
+    links, joints = [Link("link_0", random_inertial(rng))], []
+    for k in range(1, int(rng.integers(5, 9))):
+        kinds: tuple[JointType, ...] = ("revolute", "prismatic", "fixed", "fixed")
+        kind: JointType = "ball" if balls and k == 1 else kinds[int(rng.integers(4))]
+        axis = rng.standard_normal(3)
+        x, y, z = (axis / np.linalg.norm(axis)).tolist()
+        T = homogeneous(random_rotation(rng), rng.uniform(-0.4, 0.4, 3))
+        parent = f"link_{rng.integers(max(0, k - 3), k)}"
+        limits = Limits() if kind == "ball" else Limits(-1.0, 1.0, 5.0, 9.0)
+        joints.append(Joint(f"joint_{k}", kind, parent, f"link_{k}", Pose.from_matrix(T), (x, y, z), limits))
+        links.append(Link(f"link_{k}", random_inertial(rng)))
+    return Model.build("tree", links, joints, base="floating" if floating else "fixed")
+
+
+def text_with_boxes(model: Model, before: Model, written: str) -> str:
+    """Return the text of a model with other frames, with the box of each link where `before` has it."""
+    text = {"urdf": model.to_urdf, "mjcf": model.to_mjcf, "sdf": model.to_sdf}[written]()
+    for link in model.links:
+        was, now = before.inertial(link.name).origin.matrix, model.inertial(link.name).origin.matrix
+        place = Pose.from_matrix(now @ inverse(was) @ homogeneous(np.eye(3), np.array([0.1, 0.02, 0.03])))
+        xyz, rpy = (" ".join(map(repr, each)) for each in (place.xyz, place.rpy))
+        quat = " ".join(map(repr, np.roll(quat_from_rotation(place.matrix[:3, :3]), 1).tolist()))
+        shape = {
+            "urdf": f'<collision><origin xyz="{xyz}" rpy="{rpy}"/>'
+            f'<geometry><box size="{SIDES}"/></geometry></collision>',
+            "sdf": f'<collision name="box"><pose>{xyz} {rpy}</pose>'
+            f"<geometry><box><size>{SIDES}</size></box></geometry></collision>",
+            "mjcf": f'<geom type="box" size="0.15 0.1 0.05" mass="0" pos="{xyz}" quat="{quat}"/>',
+        }[written]
+        tag = "body" if written == "mjcf" else "link"
+        text, count = re.subn(rf'(<{tag} name="{link.name}"[^>]*>)', rf"\1{shape}", text)
+        assert count == 1
+    return text
+
+
+def moved_or_turned(joint: Joint, size: float, rng: np.random.Generator) -> Joint:
+    """Return a joint at another place: one that does not turn its body as it likes may be turned."""
+    direction = rng.standard_normal(3)
+    direction /= np.linalg.norm(direction)
+    off = homogeneous(np.eye(3), size * direction)
+    if joint.type != "ball" and rng.random() < 0.5:
+        off = Pose((0.0, 0.0, 0.0), (size * direction[0], size * direction[1], size * direction[2])).matrix
+    return replace(joint, origin=Pose.from_matrix(joint.origin.matrix @ off))
+
+
+@QUICK
+@given(SEEDS, SIZES, st.sampled_from(["urdf", "mjcf", "sdf"]), st.booleans(), st.booleans())
+# Links that a slide carries, a base of links alone, and bases with slides and ball joints.
+@example(4, 1e-5, "sdf", True, False)
+@example(45, 0.014, "urdf", True, False)
+@example(83, 0.06, "urdf", True, False)
+@example(115, 7e-5, "sdf", True, True)
+@example(130, 1e-4, "mjcf", True, False)
+@example(193, 0.015, "mjcf", True, False)
+def test_a_misplaced_joint_is_named_where_frames_are_moved_and_shapes_move_along(
+    seed: int, size: float, written: str, floating: bool, balls: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    model = tree(rng, floating, balls and written != "urdf")
+    # Below slides alone, or at a fixed base, nothing but mass is seen.
+    joint = picked(
+        model,
+        rng,
+        lambda each: floating or any(other.type in ("revolute", "ball") for other in above(model, each)),
+    )
+    other = with_moved_frames(with_joint(model, moved_or_turned(joint, size, rng)), rng)
+    base = model.base if written == "urdf" else None
+    texts = text_with_boxes(model, model, written), text_with_boxes(other, model, written)
+    report = same_robot(*texts, base=base)
+    assert names(report) == [("origin", joint.name, joint.name)]
+    assert report.attributes == ()
+    assert report.mended is not None
+    assert same_robot(model, report.mended).same
