@@ -21,7 +21,7 @@ from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 
 ENGINES = ("pinocchio", "pybullet", "mujoco", "drake")
-SCRIPTS = {name: Path(__file__).with_name(f"raw_{name}.py") for name in ENGINES}
+SCRIPT = Path(__file__).with_name("raw_engine.py")
 
 
 def beside(original: Path, data: bytes, folder: Path) -> Path:
@@ -76,7 +76,7 @@ def run_script(engine: str, tasks: Sequence[dict[str, Any]], folder: Path) -> li
     """Run one engine in a process without dynx; a task with which the process ends has an error."""
     inputs, found = folder / f"{engine}_tasks.json", folder / f"{engine}_results.json"
     inputs.write_text(json.dumps(list(tasks)), encoding="utf-8")
-    command = [sys.executable, str(SCRIPTS[engine]), str(inputs), str(found)]
+    command = [sys.executable, str(SCRIPT), engine, str(inputs), str(found)]
     if subprocess.run(command, check=False, capture_output=True, cwd=folder).returncode == 0:
         loaded: list[Any] = json.loads(found.read_text(encoding="utf-8"))
         return loaded

@@ -1,14 +1,12 @@
-"""Drake alone, as a script: ``python raw_drake.py TASKS.json ANSWERS.json``. No dynx in here.
+"""Drake alone, run by raw_engine.py. No dynx in here.
 
-Tasks and answers are those of raw_pinocchio.py; the printed code ``load`` and ``calls`` is executed,
+Tasks and answers are those of raw_engine.py; the printed code ``load`` and ``calls`` is executed,
 the latter before ``plant.Finalize()``. A floating base has in Drake the angular velocity before the linear
 one, both in the axes of the world.
 """
 
 from __future__ import annotations
 
-import json
-import sys
 from typing import Any
 
 import numpy as np
@@ -68,21 +66,3 @@ def answer(task: dict[str, Any]) -> list[dict[str, Any]]:
         ]
         found.append({"poses": poses, "M": (turn.T @ M @ turn).tolist(), "tau": (turn.T @ tau).tolist()})
     return found
-
-
-def answer_or_error(task: dict[str, Any]) -> Any:
-    try:
-        return answer(task)
-    except Exception as error:
-        return {"error": f"{type(error).__name__}: {error}"}
-
-
-def main() -> None:
-    with open(sys.argv[1], encoding="utf-8") as file:
-        tasks = json.load(file)
-    with open(sys.argv[2], "w", encoding="utf-8") as file:
-        json.dump([answer_or_error(task) for task in tasks], file)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,14 +1,12 @@
-"""MuJoCo alone, as a script: ``python raw_mujoco.py TASKS.json ANSWERS.json``. No dynx in here.
+"""MuJoCo alone, run by raw_engine.py. No dynx in here.
 
-Tasks and answers are those of raw_pinocchio.py; the printed code ``load`` and ``calls`` is executed.
+Tasks and answers are those of raw_engine.py; the printed code ``load`` and ``calls`` is executed.
 Links that MuJoCo merges into their parents have no pose. A free joint has the linear velocity in the axes of
 the world and the angular velocity in those of the base.
 """
 
 from __future__ import annotations
 
-import json
-import sys
 from typing import Any
 
 import mujoco
@@ -64,21 +62,3 @@ def answer(task: dict[str, Any]) -> list[dict[str, Any]]:
             poses.append(T.tolist() if body > 0 else None)
         found.append({"poses": poses, "M": M.tolist(), "tau": tau.tolist()})
     return found
-
-
-def answer_or_error(task: dict[str, Any]) -> Any:
-    try:
-        return answer(task)
-    except Exception as error:
-        return {"error": f"{type(error).__name__}: {error}"}
-
-
-def main() -> None:
-    with open(sys.argv[1], encoding="utf-8") as file:
-        tasks = json.load(file)
-    with open(sys.argv[2], "w", encoding="utf-8") as file:
-        json.dump([answer_or_error(task) for task in tasks], file)
-
-
-if __name__ == "__main__":
-    main()

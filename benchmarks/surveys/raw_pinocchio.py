@@ -1,15 +1,8 @@
-"""Pinocchio alone, as a script: ``python raw_pinocchio.py TASKS.json ANSWERS.json``. No dynx in here.
-
-A task is {path, floating, joints, links, gravity, states: [{base, q, v, a}]}: joints and links by name;
-q by joint; base is None or [x, y, z, qx, qy, qz, qw]; v and a begin with the linear and angular velocity
-of the base in its own axes where it floats. An answer is {poses, M, tau} per state, or {error}.
-"""
+"""Pinocchio alone, run by raw_engine.py. No dynx in here."""
 
 from __future__ import annotations
 
-import json
 import math
-import sys
 from typing import Any
 
 import numpy as np
@@ -50,21 +43,3 @@ def answer(task: dict[str, Any]) -> list[dict[str, Any]]:
         ]
         found.append({"poses": poses, "M": M.tolist(), "tau": tau.tolist()})
     return found
-
-
-def answer_or_error(task: dict[str, Any]) -> Any:
-    try:
-        return answer(task)
-    except Exception as error:
-        return {"error": f"{type(error).__name__}: {error}"}
-
-
-def main() -> None:
-    with open(sys.argv[1], encoding="utf-8") as file:
-        tasks = json.load(file)
-    with open(sys.argv[2], "w", encoding="utf-8") as file:
-        json.dump([answer_or_error(task) for task in tasks], file)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,14 +1,12 @@
-"""PyBullet alone, as a script: ``python raw_pybullet.py TASKS.json ANSWERS.json``. No dynx in here.
+"""PyBullet alone, run by raw_engine.py. No dynx in here.
 
-Tasks and answers are those of raw_pinocchio.py. What it takes to read PyBullet's answers about a
+Tasks and answers are those of raw_engine.py. What it takes to read PyBullet's answers about a
 floating base: they are in the root's principal axes about its centre of mass, angular part first; its
 attitude is passed as the identity and gravity is turned instead, because the quaternion is misread.
 """
 
 from __future__ import annotations
 
-import json
-import sys
 from typing import Any
 
 import numpy as np
@@ -42,7 +40,16 @@ def inverse(T: Any) -> Any:
     return back
 
 
-def answer(task: dict[str, Any], client: int) -> list[dict[str, Any]]:
+def answer(task: dict[str, Any]) -> list[dict[str, Any]]:
+    # A client for each: PyBullet keeps the tree of its inverse dynamics when a robot is removed.
+    client = p.connect(p.DIRECT)
+    try:
+        return evaluate(task, client)
+    finally:
+        p.disconnect(client)
+
+
+def evaluate(task: dict[str, Any], client: int) -> list[dict[str, Any]]:
     body = p.loadURDF(
         task["path"],
         useFixedBase=not task["floating"],
@@ -111,25 +118,3 @@ def answer(task: dict[str, Any], client: int) -> list[dict[str, Any]]:
         rows = [*range(base), *(base + k for k in pick)]
         found.append({"poses": poses, "M": M[np.ix_(rows, rows)].tolist(), "tau": tau[rows].tolist()})
     return found
-
-
-def answer_or_error(task: dict[str, Any]) -> Any:
-    # A client for each: PyBullet keeps the tree of its inverse dynamics when a robot is removed.
-    client = p.connect(p.DIRECT)
-    try:
-        return answer(task, client)
-    except Exception as error:
-        return {"error": f"{type(error).__name__}: {error}"}
-    finally:
-        p.disconnect(client)
-
-
-def main() -> None:
-    with open(sys.argv[1], encoding="utf-8") as file:
-        tasks = json.load(file)
-    with open(sys.argv[2], "w", encoding="utf-8") as file:
-        json.dump([answer_or_error(task) for task in tasks], file)
-
-
-if __name__ == "__main__":
-    main()
