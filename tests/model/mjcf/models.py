@@ -10,20 +10,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from dynx.spatial.scalar import Floats
-
-Draw = Callable[[st.SearchStrategy[Any]], Any]
-
-numbers = st.floats(-1.0, 1.0).map(lambda x: round(x, 3))
-lengths = st.floats(0.05, 0.5).map(lambda x: round(x, 3))
-
-
-def vector(count: int, entries: st.SearchStrategy[float] = numbers) -> st.SearchStrategy[str]:
-    return st.lists(entries, min_size=count, max_size=count).map(lambda x: " ".join(map(str, x)))
-
-
-def direction(count: int = 3) -> st.SearchStrategy[str]:
-    """Text of a vector that is not small."""
-    return vector(count).filter(lambda text: np.linalg.norm(np.array(text.split(), float)) > 0.3)
+from tests.model.random_numbers import Draw, direction, lengths, numbers, vector
 
 
 def angles(count: int) -> st.SearchStrategy[str]:

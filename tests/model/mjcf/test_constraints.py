@@ -18,7 +18,8 @@ from dynx.model import Model, StatedEquality, StatedGravityCompensation, StatedT
 from dynx.model.conversion import ROUNDING, convert, robot_differences
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
-from tests.model.mjcf.models import Draw, lengths, models, numbers, vector
+from tests.model.mjcf.models import models
+from tests.model.random_numbers import Draw, lengths, numbers, vector
 
 mujoco = pytest.importorskip("mujoco")
 

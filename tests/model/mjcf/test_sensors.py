@@ -16,7 +16,8 @@ from dynx.errors import DescriptionError
 from dynx.model import StatedSensor
 from dynx.model.conversion import convert, robot_differences
 from dynx.model.mjcf.reader import read_trees
-from tests.model.mjcf.models import Draw, models
+from tests.model.mjcf.models import models
+from tests.model.random_numbers import Draw
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 
-Draw = Callable[[st.SearchStrategy[Any]], Any]
+from tests.model.random_numbers import Draw, direction, lengths, vector
 
-numbers = st.floats(-1.0, 1.0).map(lambda x: round(x, 3))
-lengths = st.floats(0.05, 0.5).map(lambda x: round(x, 3))
 angles = st.floats(-3.0, 3.0).map(lambda x: round(x, 2))
 degrees = st.floats(-170.0, 170.0).map(lambda x: round(x, 1))
-
-
-def vector(count: int, entries: st.SearchStrategy[float] = numbers) -> st.SearchStrategy[str]:
-    return st.lists(entries, min_size=count, max_size=count).map(lambda x: " ".join(map(str, x)))
-
-
-def direction(count: int = 3) -> st.SearchStrategy[str]:
-    """Text of a vector that is not small."""
-    return vector(count).filter(lambda text: np.linalg.norm(np.array(text.split(), float)) > 0.3)
 
 
 @st.composite

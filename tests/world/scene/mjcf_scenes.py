@@ -12,7 +12,8 @@ import dynx
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.world import Scene, SceneRobot
-from tests.model.mjcf.models import bodies, geoms, numbers, poses, vector
+from tests.model.mjcf.models import bodies, geoms, poses
+from tests.model.random_numbers import numbers, vector
 
 Draw = Callable[[st.SearchStrategy[Any]], Any]
 
