@@ -606,7 +606,8 @@ def _listed(names: Iterable[str]) -> str:
 # Links that a joint moves and that have neither mass nor moments of inertia.
 
 
-_MASS = 2.0 * MIN_MASS
+LEAST_MASS = 2.0 * MIN_MASS
+"""Mass [kg] that every engine accepts, too small to show in any result."""
 
 
 def has_inertial_data(case: Case) -> bool:
@@ -654,11 +655,13 @@ def with_least_inertia(case: Case, names: Sequence[str]) -> tuple[Case, str]:
         inertial = case.inertials[name]
         origin = IDENTITY if inertial is None else inertial.origin
         if inertial is not None and inertial.tensor.any():
-            new[name] = replace(inertial, mass=_MASS)
+            new[name] = replace(inertial, mass=LEAST_MASS)
         else:
-            new[name] = Inertial(_MASS, origin, ixx=ACCEPTED_MOMENT, iyy=ACCEPTED_MOMENT, izz=ACCEPTED_MOMENT)
+            new[name] = Inertial(
+                LEAST_MASS, origin, ixx=ACCEPTED_MOMENT, iyy=ACCEPTED_MOMENT, izz=ACCEPTED_MOMENT
+            )
     many = "a link without mass" if len(new) == 1 else f"{len(new)} links without mass"
-    changed = f"gave {many} {_MASS:g} kg and {ACCEPTED_MOMENT:g} kg m^2 about every axis"
+    changed = f"gave {many} {LEAST_MASS:g} kg and {ACCEPTED_MOMENT:g} kg m^2 about every axis"
     return with_inertials(case, new), changed
 
 
@@ -666,7 +669,9 @@ def least_inertial() -> str:
     """Return the text of an ``<inertial>`` with the least mass and moments that every engine accepts."""
     moments = " ".join(f'i{axis}{axis}="{decimal(ACCEPTED_MOMENT)}"' for axis in "xyz")
     products = " ".join(f'{name}="0"' for name in ("ixy", "ixz", "iyz"))
-    return f'<inertial>\n  <mass value="{decimal(_MASS)}"/>\n  <inertia {moments} {products}/>\n</inertial>'
+    return (
+        f'<inertial>\n  <mass value="{decimal(LEAST_MASS)}"/>\n  <inertia {moments} {products}/>\n</inertial>'
+    )
 
 
 def heaviest_in_root_group(case: Case) -> str | None:

@@ -548,3 +548,21 @@ def test_the_state_of_a_world_has_no_links_of_its_own() -> None:
     world = text.replace(inner, f'<world name="w">{inner}{state}</world>')
     alone, beside = (find_rule("DX701").detect(Case(XmlSource(each), "floating")) for each in (text, world))
     assert [each.link for each in beside] == [each.link for each in alone]
+
+
+@needs_all
+@pytest.mark.parametrize("tensor", ["", "<inertia><ixx>0</ixx><iyy>0</iyy><izz>0</izz></inertia>"])
+def test_a_root_of_sdf_without_mass_and_moments_gets_the_least_of_both(tensor: str) -> None:
+    """Without <inertia> the moments are 1 kg m^2, as the format says."""
+    text = trap_case("DX722").source.text
+    start, end = text.index("<inertia>"), text.index("</inertia>") + len("</inertia>")
+    report = diagnose(
+        text[:start] + tensor + text[end:], base="floating", engines=["pybullet", "drake"], samples=1
+    )
+    assert report.status == "explained", report.unexplained
+    assert "DX722" in {each.rule for each in report.differences}
+    assert report.mended is not None
+    (root,) = [each for each in dynx.load(report.mended).links if each.name == "upper"]
+    assert root.inertial is not None
+    assert root.inertial.mass == 2e-15
+    assert root.inertial.ixx == (1.5e-14 if tensor else 1.0)

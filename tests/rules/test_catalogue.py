@@ -46,6 +46,7 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
         "DX708": "a file is included",
         "DX711": "what is included is named by a model",
     },
+    "DX722": {"DX701": "moments that are not 0 are those of no box of mass 0"},
     "DX715": {"DX701": "a link of a nested model is not looked at for a box"},
     "DX716": {"DX709": "PyBullet crashes on several roots"},
     "DX719": {"DX704": "the joint has a pose, and its axis is in the frame of the model"},

@@ -25,7 +25,7 @@ from dynx.rules import (
 )
 from dynx.rules.attributes import completion, misspelled_numbers, number_or_none, positive_edit, renaming
 from dynx.rules.inertia import (
-    MIN_MASS,
+    LEAST_MASS,
     ZERO_TENSOR,
     has_inertial_data,
     heaviest_in_root_group,
@@ -231,12 +231,12 @@ class MasslessLinkWithInertia(Rule):
                 case = with_inertials(case, merged_inertials(case, group, (heavy[0], name), heavy[0]))
                 moved += 1
             else:
-                case = with_inertials(case, {name: replace(inertial, mass=2.0 * MIN_MASS)})
+                case = with_inertials(case, {name: replace(inertial, mass=LEAST_MASS)})
                 invented += 1
         done = (
             (moved, "added tensors of links without mass to links with mass rigidly connected to them"),
             (removed, "removed tensors of links without mass that cannot move"),
-            (invented, f"gave links with a tensor and without mass {2.0 * MIN_MASS:g} kg"),
+            (invented, f"gave links with a tensor and without mass {LEAST_MASS:g} kg"),
         )
         return Remedy(case, "; ".join(sentence for count, sentence in done if count))
 

@@ -20,7 +20,7 @@ from dynx.rules.geometry import (
     largest_volume,
     link_extent,
 )
-from dynx.rules.inertia import MIN_MASS, line_of, rigid_groups
+from dynx.rules.inertia import LEAST_MASS, line_of, rigid_groups
 from dynx.spatial.scalar import Floats
 
 _ROUNDING_OF_BOUNDS = 1e-9
@@ -400,7 +400,7 @@ class MassNegligible(Rule):
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the links with a mass between zero and a microgram."""
         for name, inertial in case.inertials.items():
-            if inertial is not None and 0.0 < inertial.mass < _MICROGRAM and inertial.mass != 2.0 * MIN_MASS:
+            if inertial is not None and 0.0 < inertial.mass < _MICROGRAM and inertial.mass != LEAST_MASS:
                 message = f"the mass is {inertial.mass:.3g} kg"
                 yield Detection(name, None, line_of(case, name, "mass"), message)
 

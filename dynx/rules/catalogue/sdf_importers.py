@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import posixpath
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import ClassVar
@@ -21,7 +21,9 @@ from dynx.model.sdf.vocabulary import is_undefined
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Remedy, Rule, measured_on
 from dynx.rules.geometry import file_of_mesh, is_found
+from dynx.rules.inertia import ACCEPTED_MOMENT, LEAST_MASS
 from dynx.rules.joints import fresh_name
+from dynx.rules.numbers_in_text import decimal
 
 
 def _parts(case: Case, tag: str) -> Iterator[SourceElement]:
@@ -953,3 +955,56 @@ def _undefined_elements(source: XmlSource) -> Iterator[SourceElement]:
 def _described(undefined: SourceElement) -> str:
     around = "sdf" if undefined.parent is None else undefined.parent.tag
     return f"SDF has no <{escaped(undefined.tag)}> in <{around}>"
+
+
+class MasslessLinkOfSdf(EditingRule):
+    """DX722 massless-link-of-sdf: A link of SDF has mass 0, which engines take for a fixed link or for 1 kg.
+
+    SDF wants a mass above 0. A mass of 0 mostly marks a base that does not move, as in
+    ``kuka_iiwa/model.sdf`` of ``pybullet_data``. dynx uses the numbers of the file: the base moves freely.
+
+    - PyBullet 3.2.7 (``loadSDF``) fixes a robot to the world if its root link has mass 0.
+    - Drake 1.51 gives a link of mass 0 with moments of inertia a mass of 1 kg, with a warning ("condition
+      'mass > 0' failed").
+
+    What to do: if the base does not move, connect it to the world by a fixed joint, or write
+    ``<static>true</static>`` into a model without joints that move. Otherwise enter the mass.
+    ``dynx doctor --fix`` writes a mass of 2e-15 kg, which engines accept, and which is too small to show in
+    any result. ``--choose DX722=keep`` leaves the file unchanged.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("sdf",)
+    trap_base = "floating"
+    advice = "Connect a base that does not move to the world by a fixed joint, or enter the mass."
+    choices: ClassVar[Mapping[str, str]] = {
+        "least": "give the link the least mass that engines accept",
+        "keep": "keep the file; PyBullet fixes a root without mass, and Drake gives moments 1 kg",
+    }
+    engines = measured_on("drake", "pybullet")
+    changed = f"gave links without mass {decimal(LEAST_MASS)} kg"
+    changes_physics = True
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the masses that are 0 of the root and of links with moments, in document order."""
+        bodies = {link.name: link.inertial for link in case.model.links}
+        for link in _parts(case, "link"):
+            inertial = link.first("inertial")
+            mass = None if inertial is None else inertial.first("mass")
+            name = link.attributes.get("name", "")
+            body = bodies.get(name)
+            if inertial is None or mass is None or body is None or body.mass != 0.0:
+                continue
+            is_root = name == case.model.root and case.base == "floating"
+            if not (is_root or body.tensor.any()):
+                continue
+            edits = [case.source.replacement(mass, f"<mass>{decimal(LEAST_MASS)}</mass>")]
+            inertia = inertial.first("inertia")
+            if inertia is not None and not body.tensor.any():
+                edits.append(case.source.replacement(inertia, _LEAST_INERTIA))
+            effect = "the root has no mass" if is_root else "the link has moments of inertia and no mass"
+            yield Correction(_found(link, mass, effect), tuple(edits))
+
+
+_LEAST_INERTIA = "".join(
+    ["<inertia>", *(f"<i{axis * 2}>{decimal(ACCEPTED_MOMENT)}</i{axis * 2}>" for axis in "xyz"), "</inertia>"]
+)
