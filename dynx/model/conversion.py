@@ -314,13 +314,7 @@ def _inertial_difference(mine: Inertial, theirs: Inertial) -> str:
     centers = [each.origin.matrix[:3, 3] for each in (mine, theirs)]
     if not _close(centers[1], centers[0]) and mine.mass:
         return "centre of mass"
-    return "" if _close(_tensor(theirs), _tensor(mine)) else "inertia"
-
-
-def _tensor(inertial: Inertial) -> Floats:
-    """Return the tensor (3, 3) about the centre of mass in the axes of the link."""
-    R = inertial.origin.matrix[:3, :3]
-    return np.asarray(R @ inertial.tensor @ R.T)
+    return "" if _close(theirs.link_tensor, mine.link_tensor) else "inertia"
 
 
 def _close(got: Floats, want: Floats) -> bool:

@@ -190,6 +190,12 @@ class Inertial:
             ]
         )
 
+    @property
+    def link_tensor(self) -> Floats:
+        """Inertia tensor (3, 3) about the centre of mass [kg m^2], in the axes of the link."""
+        R = self.origin.matrix[:3, :3]
+        return np.asarray(R @ self.tensor @ R.T)
+
 
 @dataclass(frozen=True)
 class Link:

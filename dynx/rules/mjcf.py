@@ -13,6 +13,7 @@ from dynx.model.mjcf.expansion import read_document
 from dynx.model.xml.reading import Element
 from dynx.model.xml.source import SourceElement
 from dynx.rules.case import Case
+from dynx.rules.numbers_in_text import decimal
 from dynx.rules.rule import Detection
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
@@ -107,19 +108,18 @@ def with_defaults(document: MjcfText, element: SourceElement, childclass: str | 
 
 def inertial_text(inertial: Inertial) -> str:
     """Write an inertial as an element of MJCF, about the axes of the body."""
-    T = inertial.origin.matrix
-    tensor = T[:3, :3] @ inertial.tensor @ T[:3, :3].T
+    tensor = inertial.link_tensor
     products = (tensor[0, 1], tensor[0, 2], tensor[1, 2])
     moments = np.diagonal(tensor)
     inertia = f'diaginertia="{decimals(moments)}"'
     if any(products):
         inertia = f'fullinertia="{decimals([*moments, *products])}"'
-    return f'<inertial pos="{decimals(T[:3, 3])}" mass="{decimals([inertial.mass])}" {inertia}/>'
+    return f'<inertial pos="{decimals(inertial.origin.xyz)}" mass="{decimals([inertial.mass])}" {inertia}/>'
 
 
 def decimals(numbers: Iterable[float]) -> str:
     """Write numbers as an attribute, each with the fewest digits that keep it."""
-    return " ".join(repr(float(number) + 0.0).removesuffix(".0") for number in numbers)
+    return " ".join(map(decimal, numbers))
 
 
 def quaternion_text(R: Floats) -> str:

@@ -954,8 +954,7 @@ def _inertial_message(old: Inertial, new: Inertial | None) -> str:
     offset = float(np.linalg.norm(np.subtract(old.origin.xyz, new.origin.xyz)))
     if offset > 0.0:
         parts.append(f"centre of mass {offset:.3g} m off")
-    R, S = (each.origin.matrix[:3, :3] for each in (old, new))
-    one, other = R @ old.tensor @ R.T, S @ new.tensor @ S.T
+    one, other = old.link_tensor, new.link_tensor
     largest = float(np.max(np.abs(other))) or float(np.max(np.abs(one))) or 1.0
     change = float(np.max(np.abs(one - other))) / largest
     if change > 1e-15:

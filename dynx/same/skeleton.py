@@ -90,9 +90,7 @@ def are_alike(one: Pose | Inertial | None, other: Pose | Inertial | None) -> boo
 
 def _numbers_of(inertial: Inertial) -> tuple[Floats, Floats, Floats]:
     """Return mass, centre of mass and tensor about it, in the axes of the link."""
-    T = inertial.origin.matrix
-    R = T[:3, :3]
-    return np.array([inertial.mass]), T[:3, 3], R @ inertial.tensor @ R.T
+    return np.array([inertial.mass]), inertial.origin.matrix[:3, 3], inertial.link_tensor
 
 
 def is_of_reader(model: Model, joint: Joint) -> bool:

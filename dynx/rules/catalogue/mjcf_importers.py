@@ -9,7 +9,6 @@ import numpy as np
 
 from dynx.errors import shown
 from dynx.model.document_format import Format
-from dynx.model.elements import Inertial
 from dynx.model.mjcf.document import MjcfText
 from dynx.model.xml.reading import Element
 from dynx.model.xml.source import Edit, SourceElement
@@ -151,16 +150,10 @@ def _is_stated(case: Case, body: BodyInText, document: MjcfText) -> bool:
     held = (
         np.diagonal(inertial.tensor)
         if "diaginertia" in given.attributes
-        else np.diagonal(_tensor_of(inertial))
+        else np.diagonal(inertial.link_tensor)
     )
     close = np.allclose(moments, held, rtol=1e-14, atol=0.0) if len(moments) == 3 else False
     return abs(mass - inertial.mass) <= 1e-14 * inertial.mass and bool(close)
-
-
-def _tensor_of(inertial: Inertial) -> Floats:
-    """Return the central tensor (3, 3) in the axes of the body."""
-    R = inertial.origin.matrix[:3, :3]
-    return np.asarray(R @ inertial.tensor @ R.T)
 
 
 class OrientationOtherThanQuaternion(EditingRule):
@@ -528,7 +521,7 @@ class InertiaFromShapesOfMjcf(CallingRule):
             inertial = link.inertial
             if inertial is None or not inertial.mass:
                 continue
-            ratio, tensor = boxes.get(link.name), _tensor_of(inertial)
+            ratio, tensor = boxes.get(link.name), inertial.link_tensor
             if ratio is not None and np.allclose(
                 np.diag(ratio) * inertial.mass, tensor, rtol=1e-12, atol=0.0
             ):

@@ -102,9 +102,7 @@ def _shapes_around(case: Case, link: Link) -> str:
 def _spread_beyond(case: Case, link: Link, extent: Extent) -> str | None:
     """Describe the direction in which the mass is spread furthest beyond what the shape allows."""
     inertial = case.model.inertial(link.name)
-    T_link_inertial = inertial.origin.matrix
-    R, center = T_link_inertial[:3, :3], T_link_inertial[:3, 3]
-    tensor = R @ inertial.tensor @ R.T / inertial.mass
+    center, tensor = inertial.origin.matrix[:3, 3], inertial.link_tensor / inertial.mass
     principal = np.linalg.eigh(tensor)[1].T
     directions = np.concatenate([_DIRECTIONS, principal])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)

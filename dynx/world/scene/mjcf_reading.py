@@ -221,8 +221,7 @@ class _SceneReader:
         mass, center, tensor = None, None, None
         if inertial is not None:
             mass, center = inertial.mass, inertial.origin.xyz
-            R = inertial.origin.matrix[:3, :3]
-            turned = R @ inertial.tensor @ R.T
+            turned = inertial.link_tensor
             tensor = (turned + turned.T) / 2.0
         try:
             made = SceneBody(
