@@ -56,6 +56,8 @@ class StepText:
     """Content that finds the kernel in this process without tracing; None: trace."""
     repeats: bool = False
     """True if the function has a loop: it takes ``repeat`` too (`dynx.simd.repetition`)."""
+    turns: int = 1
+    """Number of steps that the kernel of a function with a loop takes in a call."""
 
 
 _kernels: dict[Hashable, Kernel] = {}
@@ -88,7 +90,7 @@ def compiled(text: StepText) -> Kernel:
         shapes = {name: (size,) for name, size in text.inputs.items()}
         try:
             if text.repeats:
-                kernel = load_repetition(trace_repetition(text.function, shapes))
+                kernel = load_repetition(trace_repetition(text.function, shapes, turns=text.turns))
             else:
                 program = trace(text.function, shapes)
                 kernel = load_kernel(program_recipe(program), lambda: program)

@@ -1,8 +1,8 @@
 """A control step of a `GroundTask` in compiled kernels: motors and contacts, then the task.
 
-One kernel takes a step of the robot with its motors and contacts (`dynx.rbd.contact_step`); it is called for
-each of the `substeps`. Another one evaluates the task (`dynx.envs.task_step`). Both have one environment in
-each lane.
+One kernel takes all `substeps` of the robot with its motors and contacts (`dynx.rbd.contact_step`). Another
+one evaluates the task (`dynx.envs.task_step`). Both have one environment in each lane. Where a joint reaches
+a stop in a lane, the lane takes the control step again, one step of the robot at a time.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from dynx.simd.kernel import Kernel
 from dynx.simd.target import host
 from dynx.simd.threads import run_parts
 from dynx.simd.user_code.arrays import symbol_array, traced_array
-from dynx.spatial.scalar import Array, maximum, minimum
+from dynx.spatial.scalar import Array, Floats, maximum, minimum
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.world.preparation import prepare
 
@@ -274,11 +274,17 @@ class GroundStep(TaskStep):
         return self._motion.substeps
 
     @cached_property
-    def robot_kernel(self) -> Kernel:
-        """The kernel of a step of the robot in which no joint reaches a stop, which says where one does.
+    def control_kernel(self) -> Kernel:
+        """The kernel of all steps of the robot in a control step in which no joint reaches a stop, which says
+        where one does.
 
         Raises UnsupportedFeatureError if it cannot be compiled.
         """
+        return compiled(replace(self.robot_text(), turns=self.substeps))
+
+    @cached_property
+    def robot_kernel(self) -> Kernel:
+        """The kernel of one such step; compiled when a joint first reaches a stop."""
         return compiled(self.robot_text())
 
     @cached_property
@@ -299,19 +305,22 @@ class GroundStep(TaskStep):
     def robot_text(self, *, stops: bool = False) -> StepText:
         """Return the text of a step of the robot: from ``state``, the state at the ``begin`` of the control
         step, ``action``, drawn ``parameters`` and a ``push`` to the next ``state``, in which only the memory
-        of the task is the same. Without `stops` the largest distance ``beyond`` one [rad or m] is another
-        output: where there is none, stops change nothing."""
+        of the task is the same. Without `stops` the largest distance ``beyond`` one [rad or m], in this step
+        and those before, is another input and output: where there is none, stops change nothing."""
         sizes = {"state": self.layout.size, "begin": self.layout.size, "action": self.actions}
         if self._ground.drawn_parameters:
             sizes["parameters"] = len(self._ground.drawn_parameters)
         if self._ground.pushed:
             sizes["push"] = 2
+        if not stops:
+            sizes["beyond"] = 1
 
         def function(repeat: Any, **inputs: Array) -> dict[str, Array]:
             after = self._robot_step(repeat, inputs, stops=stops)
             found = {"state": symbol_array(self.layout.row(after))}
             if not stops:
-                found["beyond"] = symbol_array([self._beyond(self.layout.state(inputs["state"]).q, after.q)])
+                beyond = self._beyond(self.layout.state(inputs["state"]).q, after.q)
+                found["beyond"] = symbol_array([maximum(beyond, inputs["beyond"][0])])
             return found
 
         name = type(self._motion.task).__name__
@@ -407,45 +416,34 @@ class GroundLanes(TaskLanes):
     def __init__(self, step: GroundStep, count: int, max_steps: int | None = None) -> None:
         """`max_steps` is the number of steps after which an episode is truncated."""
         self.threads = 1
-        kernels, lanes = [step.robot_kernel, step.kernel], host().lanes
+        kernels, lanes = [step.control_kernel, step.kernel], host().lanes
         rows = max(count, lanes)
         sizes = {port.name: port.size for kernel in kernels for port in (*kernel.inputs, *kernel.outputs)}
         for name in ("moved", "begin"):
             del sizes[name]
-        substeps = step.substeps
-        # Two sets of the state in turn, and two that the steps of the robot write in turn.
-        states = np.zeros((4, rows, sizes.pop("state")))
+        # Two sets of the state in turn, and what the robot's steps write.
+        states = np.zeros((3, rows, sizes.pop("state")))
         steps = np.zeros((2, rows, sizes.pop("steps")))
         self.arrays = {name: np.zeros((rows, size)) for name, size in sizes.items()}
         self.arrays["limit"][...] = math.inf if max_steps is None else max_steps
         self._sets = [{"state": states[turn], "steps": steps[turn]} for turn in range(2)]
-        self._turn, self._per_turn = 0, substeps + 1
-        chosen = np.array(2 * ([0] * substeps + [1]))
-        read: list[int] = []
-        moved: list[int] = []
-        written: list[int] = []
-        for turn in range(2):
-            order = [turn, *(2 + k % 2 for k in range(substeps))]
-            read += [*order[:-1], turn]
-            moved += [order[-1]] * (substeps + 1)
-            written += [*order[1:], 1 - turn]
-        turns = np.repeat(np.arange(2), substeps + 1)
+        self._turn, self._moved = 0, states[2]
+        chosen, turns = np.array([0, 1, 0, 1]), np.array([0, 0, 1, 1])
         edges = np.arange(0, max(rows // CHUNK, 1) + 1) * CHUNK
         edges[-1] = rows
-        self._ground, self._states, self._edges = step, states, edges.tolist()
-        self._read, self._written, self._begun = read, written, turns.tolist()
+        self._ground, self._edges = step, edges.tolist()
         self._chunks = []
         for first, last in pairwise(self._edges):
             part = slice(first, last)
             known = {name: (array[None, part], 0 * turns) for name, array in self.arrays.items()}
             known |= {
-                "state": (states[:, part], np.array(read)),
-                "moved": (states[:, part], np.array(moved)),
+                "state": (states[:, part], turns),
+                "moved": (states[:, part], 2 + 0 * turns),
                 "begin": (states[:, part], turns),
                 "steps": (steps[:, part], turns),
             }
             outputs = {
-                "state": (states[:, part], np.array(written)),
+                "state": (states[:, part], np.array([2, 1, 2, 0])),
                 "steps": (steps[:, part], 1 - turns),
             }
             self._chunks.append(
@@ -462,37 +460,50 @@ class GroundLanes(TaskLanes):
 
     def evaluate(self) -> None:
         """Evaluate a step from the present state; `accept` makes its end the present state."""
-        begin = self._turn * self._per_turn
-        run_parts(lambda chunk: self._evaluate(chunk, begin), len(self._chunks), self.threads)
+        if "beyond" in self.arrays:
+            self.arrays["beyond"][...] = 0.0
+        run_parts(self._evaluate, len(self._chunks), self.threads)
 
     def evaluate_starts(self) -> None:
         """Evaluate the task alone, of environments whose episodes have ended."""
-        last = (self._turn + 1) * self._per_turn - 1
-        run_parts(lambda chunk: self._chunks[chunk].run(last, last + 1), len(self._chunks), self.threads)
+        task = 2 * self._turn + 1
+        run_parts(lambda chunk: self._chunks[chunk].run(task, task + 1), len(self._chunks), self.threads)
 
-    def _evaluate(self, chunk: int, begin: int) -> None:
-        """Evaluate a control step of a chunk of environments, from a call on."""
-        steps, end = self._chunks[chunk], begin + self._per_turn
-        part = slice(self._edges[chunk], self._edges[chunk + 1])
-        while begin < end:
-            stopped = steps.run(begin, end)
-            # A lane that diverges has NaN beyond its stops, which does not end the calls.
-            # The task, which is last, leaves what the step of the robot before it found beyond stops.
-            if stopped is None or stopped[0] == end - 1:
-                return
-            beyond = self.arrays["beyond"][part, 0]
-            self._stop_joints(part.start + np.flatnonzero(beyond > 0.0), stopped[0])
-            begin = stopped[0] + 1
+    def _evaluate(self, chunk: int) -> None:
+        """Evaluate a control step of a chunk of environments."""
+        calls, begin = self._chunks[chunk], 2 * self._turn
+        # A lane that diverges has NaN beyond its stops, which does not end the calls.
+        stopped = calls.run(begin, begin + 2)
+        if stopped is not None and stopped[0] == begin:
+            first, last = self._edges[chunk : chunk + 2]
+            beyond = self.arrays["beyond"][first:last, 0]
+            self._stop_joints(first + np.flatnonzero(beyond > 0.0))
+            calls.run(begin + 1, begin + 2)
 
-    def _stop_joints(self, rows: NDArray[np.intp], call: int) -> None:
-        """Evaluate a step of the robot again with stops, in lanes in which a joint passes one."""
-        kernel = self._ground.kernel_with_stops
-        written = self._states[self._written[call]]
-        read = self.arrays | {
-            "state": self._states[self._read[call]],
-            "begin": self._states[self._begun[call]],
+    def _stop_joints(self, rows: NDArray[np.intp]) -> None:
+        """Take the steps of the robot again in lanes in which a joint passed a stop, each with stops in those
+        in which it does."""
+        step, begin = self._ground, self.now["state"][rows]
+        given = {
+            port.name: self.arrays[port.name][rows]
+            for port in step.robot_kernel.inputs
+            if port.name not in ("state", "begin", "beyond")
         }
-        inputs = [read[port.name][rows] for port in kernel.inputs]
-        found = np.empty((len(rows), written.shape[1]))
-        kernel(inputs, [found])
-        written[rows] = found
+        given |= {"state": begin, "begin": begin, "beyond": np.zeros((len(rows), 1))}
+        for _ in range(step.substeps):
+            state, beyond = _outputs(step.robot_kernel, given)
+            stopped = np.flatnonzero(beyond[:, 0] > 0.0)
+            if len(stopped):
+                (state[stopped],) = _outputs(
+                    step.kernel_with_stops, {name: array[stopped] for name, array in given.items()}
+                )
+            given["state"] = state
+        self._moved[rows] = given["state"]
+
+
+def _outputs(kernel: Kernel, inputs: Mapping[str, Floats]) -> list[Floats]:
+    """Return what a kernel computes from inputs (n, size) by name."""
+    n = len(inputs["state"])
+    found = [np.empty((n, port.size)) for port in kernel.outputs]
+    kernel([inputs[port.name] for port in kernel.inputs], found)
+    return found

@@ -4,6 +4,9 @@ The function receives `repeat`, which repeats a step on arrays of symbols as oft
 goes on. All parts become one kernel. Values that later parts need are kept in memory, a vector each, so that
 neither code nor time of compilation grows with the number of repetitions.
 
+The whole function may be evaluated several times, in `turns`: an output with the name of an input is that
+input of the next turn. Inputs are then read from their arrays once, and outputs are written once.
+
 A lane whose loop has ended keeps its state whatever other lanes do. So its results depend neither on the
 other lanes nor on their number. The loop of a vector ends when those of all its lanes have ended; where none
 of them begins, it takes only the time of that test.
@@ -12,7 +15,7 @@ of them begins, it takes only the time of that test.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -47,6 +50,9 @@ GOES_ON = "goes_on"
 _KEPT = "kept."
 """Beginning of the names of ports of values that later parts need."""
 
+_TURN = "turn."
+"""Beginning of the names of inputs and outputs of the function that stay in memory from turn to turn."""
+
 _STATE = "state."
 """Beginning of the names of ports of the states, since arrays of the caller may have the same names."""
 
@@ -54,9 +60,12 @@ SEGMENT = 12_000
 """Length of the segments (`dynx.simd.emit`). A long one takes a tenth more time to compile than short ones,
 and the code is a fifth faster, because fewer values go through memory."""
 
-RELOADED_AFTER = 100
+RELOADED_AFTER = 150
 """Lines of code after which a value that is kept in memory is read from there again. The compiler would keep
 it on the stack as well, and both together exceed the first-level cache."""
+
+MOST_OF_NODE = 50
+"""Most operations of a node (`dynx.simd.schedule.operation_count`)."""
 
 _LEAKS = "code outside of a loop uses what a step of the loop computed, beside the state"
 
@@ -77,6 +86,8 @@ class Repetition:
     """For each loop the step from its state, and from what was computed before, to the next state."""
     most: tuple[int, ...]
     """Largest number of repetitions of each loop."""
+    turns: int = 1
+    """Number of evaluations of the function one after another."""
 
     @property
     def parts(self) -> tuple[Program, ...]:
@@ -89,6 +100,7 @@ def trace_repetition(
     function: Callable[..., Mapping[str, Array]],
     inputs: Mapping[str, tuple[int, ...]],
     *,
+    turns: int = 1,
     simplify: Simplify | None = FAST,
 ) -> Repetition:
     """Trace ``function(repeat=repeat, **arrays)``, which returns a mapping from output names to arrays.
@@ -96,10 +108,11 @@ def trace_repetition(
     It calls ``repeat(step, state, most)`` for each loop, which returns the last state. ``step(state)``
     returns the next state, arrays by the same names; it may also use whatever was computed before. What it
     computes without the state is computed once. The loop ends after `most` steps, or where ``goes_on`` (1,)
-    of the state is 0. Raises TraceError as `trace` does, or if the function does not keep to this.
+    of the state is 0. In each of the `turns` after the first, inputs with the name of an output are that
+    output of the turn before. Raises TraceError as `trace` does, or if the function does not keep to this.
     """
     with collection_paused():
-        return _Tracer(inputs, simplify).repetition(function)
+        return replace(_Tracer(inputs, simplify).repetition(function), turns=turns)
 
 
 @dataclass
@@ -320,7 +333,18 @@ class _PortSlots:
             for port in code.outputs:
                 slots[port.name] = size
                 size += port.size
+        if repetition.turns > 1:
+            for port in (*repetition.inputs, *repetition.outputs):
+                if (name := f"{_TURN}{port.name}") not in slots:
+                    slots[name] = size
+                    size += port.size
         return cls(arrays, slots, size)
+
+    def of_array(self, name: str, number: int) -> tuple[bool, int]:
+        """Return the place of an input or output of the function: in memory, if there are turns, or array
+        `number`."""
+        slot = self.slots.get(f"{_TURN}{name}")
+        return (False, number) if slot is None else (True, slot)
 
 
 class _PartBody(SegmentBody):
@@ -360,6 +384,7 @@ class _PartBody(SegmentBody):
         return self._rows[port].load(column)
 
     def _store_results(self) -> None:
+        kept: dict[int, int] = {}
         for output, columns, nodes in self._segment.stores:
             in_memory, place = self._targets[output]
             if not in_memory:
@@ -367,8 +392,20 @@ class _PartBody(SegmentBody):
                 self._rows[len(self._program.inputs) + output].store_tile(columns.start, values)
                 continue
             for column, node in zip(columns, nodes, strict=True):
-                if node not in self._results:
-                    self._keep(self._value(node), place + column)
+                if node not in self._results and self._slot_of(node) != place + column:
+                    kept[place + column] = node
+        # Results may replace values that others are read from.
+        for slot, name in [(slot, self._value(node)) for slot, node in kept.items()]:
+            self._keep(name, slot)
+
+    def _slot_of(self, index: int) -> int | None:
+        """Return the slot of an input in memory, None for another node."""
+        node = self._program.nodes[index]
+        if node.op != "input":
+            return None
+        port, column = self._slot_port[node.slot]
+        in_memory, place = self._sources[port]
+        return place + column if in_memory else None
 
     def _compute(self, index: int) -> None:
         nodes = self._program.nodes
@@ -387,18 +424,17 @@ class _PartBody(SegmentBody):
         self._ages[index] = len(self._write.lines)
 
     def _value(self, index: int) -> str:
-        if (
-            index in self._results
-            and index in self._ages
-            and len(self._write.lines) - self._ages[index] > RELOADED_AFTER
-        ):
-            write = self._write
-            name = write.let(
-                f"load {write.vector}, ptr {self._at(self._results[index][0])}, align {self._bytes}"
-            )
+        write, now = self._write, len(self._write.lines)
+        results = self._results.get(index)
+        slot = results[0] if results else self._slot_of(index)
+        if slot is not None and now - self._ages.get(index, now) > RELOADED_AFTER:
+            name = write.let(f"load {write.vector}, ptr {self._at(slot)}, align {self._bytes}")
             self._values[index] = name
             self._ages[index] = len(write.lines)
-        return super()._value(index)
+            return name
+        found = super()._value(index)
+        self._ages.setdefault(index, now)
+        return found
 
 
 def emit_repetition(repetition: Repetition, target: Processor, settings: Settings) -> list[str]:
@@ -406,20 +442,26 @@ def emit_repetition(repetition: Repetition, target: Processor, settings: Setting
     layout = _PortSlots.of(repetition)
     bodies: list[str] = []
     calls: list[list[int]] = []
-    size = layout.size
-    last = len(repetition.parts) - 1
-    results: dict[int, list[int]]
-    for part, program in enumerate(repetition.parts):
-        is_step = part % 2 == 1
-        segments = schedule(program, settings.lanes, settings.segment, in_memory=part < last)
+    size, last, inputs = layout.size, len(repetition.parts) - 1, repetition.inputs
+    has_turns = repetition.turns > 1
+    read: set[int] = set()
+    """Slots that the parts read."""
+
+    def add(
+        program: Program,
+        sources: Sequence[tuple[bool, int]],
+        targets: Sequence[tuple[bool, int]],
+        *,
+        longest: int = settings.segment,
+        is_step: bool = False,
+        at_once: bool = False,
+    ) -> list[int]:
+        """Write the segments of a program; return their numbers."""
+        nonlocal size
+        in_memory = all(each for each, _ in targets)
+        segments = schedule(program, settings.lanes, longest, in_memory=in_memory)
         check_schedule(program, segments, settings.lanes)
-        sources = list(_places(program.inputs, layout, repetition.inputs, arrays=not is_step))
-        if part < last:
-            targets = list(_places(program.outputs, layout, (), arrays=False))
-        else:
-            targets = [(False, len(repetition.inputs) + k) for k in range(len(program.outputs))]
-        # Results in memory are written at once, unless they replace values that are read.
-        results = _results(program, targets) if part < last and not is_step else {}
+        results = _results(program, targets) if at_once else {}
         for segment in segments:
             segment.spilled -= results.keys()
         spilled = spill_slots(program, segments)
@@ -427,8 +469,8 @@ def emit_repetition(repetition: Repetition, target: Processor, settings: Setting
         slots |= {node: layout.size + slot for node, slot in spilled.items()}
         size = max(size, layout.size + max(spilled.values(), default=-1) + 1)
         first = len(bodies)
-        bodies += [
-            _PartBody(
+        for k, segment in enumerate(segments):
+            body = _PartBody(
                 program,
                 target,
                 settings,
@@ -439,14 +481,68 @@ def emit_repetition(repetition: Repetition, target: Processor, settings: Setting
                 outputs=targets,
                 is_step=is_step,
                 results=results,
-            ).text("")
-            for k, segment in enumerate(segments)
+            )
+            bodies.append(body.text(""))
+        read.update(_read_slots(program, sources))
+        return list(range(first, len(bodies)))
+
+    outputs = [(False, len(inputs) + k) for k in range(len(repetition.outputs))]
+    for part, program in enumerate(repetition.parts):
+        is_step = part % 2 == 1
+        sources = list(_places(program.inputs, layout, inputs, arrays=not is_step))
+        if part < last:
+            # Results in memory are written at once, unless they replace values that are read.
+            targets = list(_places(program.outputs, layout, (), arrays=False))
+            calls.append(add(program, sources, targets, is_step=is_step, at_once=not is_step))
+        else:
+            targets = [
+                layout.of_array(port.name, k) for port, (_, k) in zip(program.outputs, outputs, strict=True)
+            ]
+            longest = len(program.nodes) * MOST_OF_NODE if has_turns else settings.segment
+            calls.append(add(program, sources, targets, longest=longest))
+    ends: tuple[list[int], list[int]] = [], []
+    if has_turns:
+        arrays = [(False, k) for k in range(len(inputs))]
+        kept = [layout.of_array(port.name, 0) for port in repetition.outputs]
+        every = _identity(repetition.outputs)
+        ends[1].extend(add(every, kept, outputs))
+        slots = [
+            layout.slots[f"{_TURN}{port.name}"] + column for port in inputs for column in range(port.size)
         ]
-        calls.append(list(range(first, len(bodies))))
+        used = [slot in read for slot in slots]
+        targets = [(True, slot) for slot, is_used in zip(slots, used, strict=True) if is_used]
+        ends[0].extend(add(_columns(inputs, used), arrays, targets))
     declared = [f"declare void @segment{k}(ptr, i64, ptr)" for k in range(len(bodies))]
     goes_on = [layout.slots[f"{_STATE}{k}.{GOES_ON}"] for k in range(len(repetition.steps))]
-    loop = _loop(repetition, goes_on, calls, size, settings.lanes)
+    loop = _loop(repetition, goes_on, calls, ends, size, settings.lanes)
     return [_module(texts, target, settings) for texts in (*([body] for body in bodies), [*declared, loop])]
+
+
+def _identity(ports: Sequence[Port]) -> Program:
+    """Return the program whose outputs are its inputs."""
+    size = sum(port.size for port in ports)
+    return Program(
+        tuple(Node("input", slot=k) for k in range(size)), tuple(ports), tuple(ports), tuple(range(size))
+    )
+
+
+def _columns(ports: Sequence[Port], used: Sequence[bool]) -> Program:
+    """Return the program whose outputs are the columns of its inputs that are `used`, each by itself."""
+    nodes = tuple(Node("input", slot=k) for k, is_used in enumerate(used) if is_used)
+    outputs = tuple(Port(f"column{k}", (1,)) for k in range(len(nodes)))
+    return Program(nodes, tuple(ports), outputs, tuple(range(len(nodes))))
+
+
+def _read_slots(program: Program, sources: Sequence[tuple[bool, int]]) -> Iterator[int]:
+    """Yield the slots of memory that a program reads."""
+    of_scalar = [
+        place + column if in_memory else None
+        for (in_memory, place), port in zip(sources, program.inputs, strict=True)
+        for column in range(port.size)
+    ]
+    for node in program.nodes:
+        if node.op == "input" and (slot := of_scalar[node.slot]) is not None:
+            yield slot
 
 
 def _results(program: Program, targets: Sequence[tuple[bool, int]]) -> dict[int, list[int]]:
@@ -465,7 +561,10 @@ def _places(
 ) -> Iterator[tuple[bool, int]]:
     names = {port.name for port in inputs} if arrays else set[str]()
     for port in ports:
-        yield (False, layout.arrays[port.name]) if port.name in names else (True, layout.slots[port.name])
+        if port.name in names:
+            yield layout.of_array(port.name, layout.arrays[port.name])
+        else:
+            yield True, layout.slots[port.name]
 
 
 def _module(functions: Sequence[str], target: Processor, settings: Settings) -> str:
@@ -477,14 +576,20 @@ def _module(functions: Sequence[str], target: Processor, settings: Settings) -> 
 
 
 def _loop(
-    repetition: Repetition, goes_on: Sequence[int], calls: Sequence[Sequence[int]], slots: int, lanes: int
+    repetition: Repetition,
+    goes_on: Sequence[int],
+    calls: Sequence[Sequence[int]],
+    ends: Sequence[Sequence[int]],
+    slots: int,
+    lanes: int,
 ) -> str:
-    """Return the entry function (`dynx.simd.emit`)."""
+    """Return the entry function (`dynx.simd.emit`). `ends` are the segments before and after all turns."""
     vector = f"<{lanes} x double>"
-    parts = [
+    before, after, *parts = [
         [f"  call void @segment{k}(ptr %arguments, i64 %first, ptr %kept)" for k in numbers]
-        for numbers in calls
+        for numbers in (*ends, *calls)
     ]
+    final = len(goes_on) - 1
     lines = [
         f"define void @{ENTRY}(ptr noalias nocapture readonly %arguments) {{",
         "entry:",
@@ -498,18 +603,22 @@ def _loop(
         *prefetch_pointers(repetition.inputs, repetition.outputs),
         "  br label %group",
         "group:",
-        f"  %i = phi i64 [0, %entry], [%next, %end{len(goes_on) - 1}]",
+        "  %i = phi i64 [0, %entry], [%next, %turned]",
         "  %late = icmp sgt i64 %i, %last",
         "  %first = select i1 %late, i64 %last, i64 %i",
         *prefetch(repetition.inputs, repetition.outputs, lanes),
+        *before,
+        "  br label %turn",
+        "turn:",
+        f"  %turns = phi i64 [1, %group], [%more_turns, %end{final}]",
         *parts[0],
     ]
     for k, most in enumerate(repetition.most):
-        before = "group" if k == 0 else f"end{k - 1}"
+        entered = "turn" if k == 0 else f"end{k - 1}"
         lines += [
             f"  br label %test{k}",
             f"test{k}:",
-            f"  %count{k} = phi i64 [0, %{before}], [%next{k}, %repeat{k}]",
+            f"  %count{k} = phi i64 [0, %{entered}], [%next{k}, %repeat{k}]",
             f"  %goes_on{k} = load {vector}, ptr %goes_on_at{k}, align {8 * lanes}",
             f"  %some{k} = fcmp une {vector} %goes_on{k}, zeroinitializer",
             f"  %bits{k} = bitcast <{lanes} x i1> %some{k} to i{lanes}",
@@ -527,6 +636,11 @@ def _loop(
     return "\n".join(
         [
             *lines,
+            "  %more_turns = add i64 %turns, 1",
+            f"  %again = icmp slt i64 %turns, {repetition.turns}",
+            "  br i1 %again, label %turn, label %turned",
+            "turned:",
+            *after,
             f"  %next = add i64 %i, {lanes}",
             "  %more_groups = icmp slt i64 %next, %n",
             "  br i1 %more_groups, label %group, label %done",
@@ -549,7 +663,8 @@ def load_repetition(repetition: Repetition) -> Kernel:
     """Load the kernel of a repetition from the cache, or compile and store it."""
     target = host()
     settings = Settings(target.lanes, segment=SEGMENT)
-    recipe = b"\n".join([*map(program_recipe, repetition.parts), str(repetition.most).encode()])
+    numbers = f"{repetition.most} {repetition.turns}"
+    recipe = b"\n".join([*map(program_recipe, repetition.parts), numbers.encode()])
     return load_code(
         recipe, lambda: compile_repetition(repetition, target, settings), target, settings, Kernel
     )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dynx.errors import TraceError
+from dynx.simd.kernel import Kernel
 from dynx.simd.repetition import Repetition, load_repetition, trace_repetition
 from dynx.spatial.scalar import Array, Floats, less, sqrt
 
@@ -212,3 +213,31 @@ def test_quotients_by_roots_in_a_step_are_correct_to_the_last_places() -> None:
     least = np.full((8, 1), 1e-300)
     kernel([least, np.ones((8, 1))], [found[:8]])
     np.testing.assert_allclose(found[:8], 1e150, rtol=1e-15)
+
+
+def test_turns_are_calls_one_after_another() -> None:
+    def function(x: Array, scale: Array, count: Array, repeat: Any) -> Numbers:
+        root = root_of(x, scale, repeat)["root"][0]
+        # One entry of x stays, the others change places.
+        turned = np.array([root + 1e-3 * x[1], x[2], x[1], x[3]])
+        return {"x": turned, "count": count + 1.0, "before": x[:1]}
+
+    shapes = {"x": (4,), "scale": (1,), "count": (1,)}
+    kernel = load_repetition(trace_repetition(function, shapes, turns=4))
+    one = load_repetition(trace_repetition(function, shapes))
+    n = 13
+    x, count = np.random.default_rng(0).uniform(1.0, 5.0, (n, 4)), np.zeros((n, 1))
+    scale = np.full((n, 1), 3.0)
+
+    def call(kernel: Kernel, x: Floats, count: Floats) -> list[Floats]:
+        found = [np.full((n, port.size), np.nan) for port in kernel.outputs]
+        kernel([x, scale, count], found)
+        return found
+
+    after = call(kernel, x, count)
+    for _ in range(4):
+        x, count, before = call(one, x, count)
+    assert np.array_equal(after[0], x)
+    assert np.array_equal(after[1], count)
+    assert np.array_equal(after[2], before)
+    assert (count == 4.0).all()
