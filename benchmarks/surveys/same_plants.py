@@ -1,4 +1,4 @@
-"""Planted differences of 84 kinds for the survey of ``dynx same``, and the elements they change."""
+"""Planted differences of 86 kinds for the survey of ``dynx same``, and the elements they change."""
 
 from __future__ import annotations
 
@@ -249,6 +249,22 @@ def _mimic(offset: bool) -> Plant:
 
 plant("mimic factor", ("urdf", "sdf"))(_mimic(False))
 plant("mimic offset", ("urdf", "sdf"))(_mimic(True))
+
+
+@plant("mimic leader", ("urdf", "sdf"))
+def _mimic_leader(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    joint = _pick(rng, [each for each in robot.joints if each.moves and each.mimic is not None])
+    leader, m, o = joint.mimic
+    others = [each.name for each in robot.joints if each.moves and each.mimic is None and each.name != leader]
+    joint.mimic = (_pick(rng, others), m, o)
+    return Planted("mimic", {joint.name})
+
+
+@plant("mimic missing", ("urdf", "sdf"))
+def _mimic_missing(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
+    joint = _pick(rng, [each for each in robot.joints if each.moves and each.mimic is not None])
+    joint.mimic = None
+    return Planted("mimic", {joint.name})
 
 
 def _shape(robot: Robot, rng: np.random.Generator, kinds: tuple[str, ...]) -> tuple[Link, Shape, str]:
@@ -977,7 +993,7 @@ def judged(
     ]
     if named and len(report.differences) == 1:
         return "right" if not attributes else f"right, extra: {told}"
-    if len(report.differences) == 1 and report.mended_text is not None:
+    if len(report.differences) == 1 and report.mended_text is not None and not attributes:
         other = _mended_difference(a, b[1], report, to, floating, seed)
         if other < 1e-5:
             return f"right (equivalent): {told}"

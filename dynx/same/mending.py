@@ -1,7 +1,7 @@
 """Mended text: the description with some elements replaced, and all else as it is written.
 
 What is written follows from two models, the one that was read and the one that it is to be. URDF can be
-mended wherever they differ; in MJCF and SDF inertias, places of bodies and axes of joints.
+mended wherever they differ; in MJCF and SDF inertias, places of bodies and axes of joints, in SDF also types.
 """
 
 from __future__ import annotations
@@ -175,8 +175,10 @@ class _Sdf:
         """Yield the edits of axes of joints, and of poses of links whose places in the root link differ at
         position 0."""
         for joint, new_joint in zip(before.joints, after.joints, strict=True):
-            if (joint.type, joint.mimic) != (new_joint.type, new_joint.mimic):
-                raise NotMendedError(f"the type or coupling of joint {joint.name}: SDF is not mended for it")
+            if joint.mimic != new_joint.mimic:
+                raise NotMendedError(f"the coupling of joint {joint.name}: SDF is not mended for it")
+            if joint.type != new_joint.type:
+                yield from self._type(joint, new_joint)
         old, new = _places(before), _places(after)
         for link in before.links:
             # A link that a joint with two axes adds stands in no file.
@@ -187,6 +189,18 @@ class _Sdf:
                 moved = np.linalg.inv(old[joint.child]) @ new[joint.child]
                 turned = bool((old[joint.child] != new[joint.child])[:3, :3].any())
                 yield from self._axis(joint, other, moved, turned=turned)
+
+    def _type(self, old: Joint, new: Joint) -> Iterator[Edit]:
+        """Write the type of a joint, and axis and limits of one that was fixed."""
+        joint = self._element("joint", old.name)
+        if "ball" in (old.type, new.type) or joint.first("axis2") is not None:
+            raise NotMendedError(f"the type of joint {old.name}: SDF is not mended for more than one axis")
+        yield self._source.attribute_edit(joint, "type", new.type)
+        if not old.moves and joint.first("axis") is None:
+            ends = {"lower": new.limits.lower, "upper": new.limits.upper}
+            rows = "".join(f"<{k}>{number(end)}</{k}>" for k, end in ends.items() if np.isfinite(end))
+            axis = f"<axis><xyz>{numbers(new.axis)}</xyz><limit>{rows}</limit></axis>"
+            yield self._source.insertion(joint, axis)
 
     def _axis(self, old: Joint, new: Joint, moved: Floats, *, turned: bool) -> Iterator[Edit]:
         """Write the axis of a joint that differs, or that is written in the frame of the model if the link is

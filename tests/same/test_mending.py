@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import pytest
@@ -231,6 +232,38 @@ def test_sdf_is_mended(old: str, new: str, element: tuple[str, str]) -> None:
     text = report.mended_text.decode()
     assert "<!-- the forearm -->" in text
     assert same_robot(SDF, text).same
+
+
+SHOULDER = SDF[SDF.index('<joint name="shoulder"') : SDF.index('<joint name="elbow"')]
+
+
+@pytest.mark.parametrize("axis", ["<xyz>0 1 0</xyz>", "<xyz>0 0.6 0.8</xyz>"])
+@pytest.mark.parametrize("kinds", list(permutations(["revolute", "prismatic", "continuous", "fixed"], 2)))
+def test_types_of_joints_of_sdf_are_mended(kinds: tuple[str, str], axis: str) -> None:
+    texts = []
+    for kind in kinds:
+        shoulder = SHOULDER.replace('type="revolute"', f'type="{kind}"').replace("<xyz>0 1 0</xyz>", axis)
+        if kind == "fixed":
+            shoulder = shoulder[: shoulder.index("<axis>")] + "</joint>"
+        texts.append(SDF.replace(SHOULDER, shoulder))
+    report = same_robot(*texts)
+    if set(kinds) == {"revolute", "continuous"}:
+        assert report.same
+        return
+    assert [(each.theirs, each.part) for each in report.differences] == [("shoulder", "type")]
+    assert report.mended_text is not None, report.not_mended
+    again = same_robot(texts[0], report.mended_text.decode())
+    assert again.same
+    # The limits of a joint that moves in both files are no part of its type.
+    assert again.attributes == () or "fixed" not in kinds
+
+
+@pytest.mark.parametrize("kinds", [("ball", "revolute"), ("revolute", "ball")])
+def test_ball_joints_of_sdf_are_not_mended_to_another_type(kinds: tuple[str, str]) -> None:
+    texts = [SDF.replace('"elbow" type="revolute"', f'"elbow" type="{kind}"') for kind in kinds]
+    report = same_robot(*texts)
+    assert report.mended_text is None
+    assert "elbow" in str(report.not_mended)
 
 
 def test_a_joint_of_sdf_is_moved_with_the_links_below_it() -> None:
