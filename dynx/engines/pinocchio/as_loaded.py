@@ -1,4 +1,6 @@
-"""A file as Pinocchio loads it: ``pin.buildModelFromUrdf`` or ``pin.buildModelFromMJCF`` and nothing more.
+"""A file as Pinocchio loads it, by ``pin.buildModelFromUrdf`` or ``pin.buildModelFromMJCF`` alone.
+
+Quantities are computed in the gravity of the model of dynx; `LoadedModel.gravity` is Pinocchio's own.
 
 Pinocchio has its own order of joints, has two numbers (cos, sin) for a continuous joint, and makes joints
 of several degrees of freedom where the file has them. Here its coordinates are converted to those of dynx
@@ -69,7 +71,7 @@ class LoadedPinocchio(LoadedRobot):
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
         self._form = checked_format(type(self), path)
         self._model = model
-        root = [pin.JointModelFreeFlyer()] if model.floating else []
+        base_joint = [pin.JointModelFreeFlyer()] if model.floating else []
         messages: list[str] = []
         read = "buildModelFromMJCF" if self._form == "mjcf" else "buildModelFromUrdf"
         with self._convert_errors(read):
@@ -77,7 +79,7 @@ class LoadedPinocchio(LoadedRobot):
                 if self._form == "mjcf":
                     self._engine = pin.buildModelFromMJCF(str(path))
                 else:
-                    self._engine = pin.buildModelFromUrdf(str(path), *root)
+                    self._engine = pin.buildModelFromUrdf(str(path), *base_joint)
             if "pinocchio.no_armature" in calls:
                 self._engine.armature[:] = 0
             if self._engine.nv > MAX_NV:
@@ -92,6 +94,7 @@ class LoadedPinocchio(LoadedRobot):
         self._neutral: Floats = np.array(pin.neutral(self._engine))
         if model.floating and (self._engine.njoints < 2 or self._engine.joints[1].nv != 6):
             raise UnusableEngineError(f"pinocchio does not let the base of {model.name} float")
+        self._composites = self._find_composites()
         self._joints = self._find_joints()
         self._links = {
             frame.name: number
@@ -110,11 +113,12 @@ class LoadedPinocchio(LoadedRobot):
     @classmethod
     @checks_types
     def load_call(cls, floating: bool, root: str | None = None, form: Format = "urdf") -> str:
-        """Return the call: one line; for URDF the joint of a floating base is its second argument."""
+        """Return the call: one line; for URDF the joint of a floating base is its second argument. Pinocchio
+        finds the root link itself, so `root` has no effect."""
         if form == "mjcf":
             return "model = pinocchio.buildModelFromMJCF(path)"
-        root = ", pinocchio.JointModelFreeFlyer()" if floating else ""
-        return f"model = pinocchio.buildModelFromUrdf(path{root})"
+        base_joint = ", pinocchio.JointModelFreeFlyer()" if floating else ""
+        return f"model = pinocchio.buildModelFromUrdf(path{base_joint})"
 
     # -- quantities ------------------------------------------------------------------------------
 
@@ -161,8 +165,8 @@ class LoadedPinocchio(LoadedRobot):
         return np.asarray(tau[self._v])
 
     def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """Return the acceleration by ``aba``, or by ``crba`` and ``rnea`` where a joint that the model lacks
-        is held."""
+        """Return the acceleration by ``aba``, or by ``crba`` and ``rnea`` where a joint without a coordinate
+        of dynx is held."""
         if len(self._v) < self._engine.nv:
             return self._solved_acceleration(q, v, tau)
         with self._convert_errors("aba"):
@@ -210,18 +214,17 @@ class LoadedPinocchio(LoadedRobot):
             frame = engine.frames[number]
             above = engine.frames[frame.parentFrame]
             own, merged = frame.inertia, ()
-            if above.type == pin.FrameType.FIXED_JOINT:
+            # The frame above a link fixed to the world is the universe, which has no inertia of its own.
+            if above.type == pin.FrameType.FIXED_JOINT and frame.parentFrame != WORLD:
                 own = above.inertia
             elif frame.parentJoint != WORLD:
-                own = engine.inertias[frame.parentJoint]
+                # A joint off the origin of its body has a frame of its own.
+                own = frame.placement.actInv(engine.inertias[frame.parentJoint])
                 merged = tuple(
                     other
                     for other, at in self._links.items()
                     if other != name and engine.frames[at].parentJoint == frame.parentJoint
                 )
-            if self._form == "mjcf" and own is not frame.inertia and above.type != pin.FrameType.FIXED_JOINT:
-                # A joint off the origin of its body has a frame of its own.
-                own = frame.placement.actInv(own)
             yield name, LoadedInertial(float(own.mass), np.array(own.lever), np.array(own.inertia), merged)
 
     def _describe_joint(self, number: int) -> LoadedJoint:
@@ -300,7 +303,6 @@ class LoadedPinocchio(LoadedRobot):
 
     def _find_joints(self) -> list[Any]:
         """Return the engine's joint for each coordinate of dynx."""
-        self._composites = self._find_composites()
         known = {name: self._engine.joints[number] for number, name in enumerate(self._engine.names)}
         known |= dict(member for members in self._composites.values() for member in members)
         names = self._model.joint_names

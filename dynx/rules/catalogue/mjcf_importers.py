@@ -690,14 +690,13 @@ class MeshOfMjcfNotFound(Rule):
 
 
 class PlaceOfFixedBody(Rule):
-    """DX618 place-of-fixed-body: A body is fixed to the world, and Pinocchio ignores its pose and mass.
+    """DX618 place-of-fixed-body: A body is fixed to the world, and Pinocchio ignores its pose.
 
     A body of ``<worldbody>`` without a joint is fixed to the world at its ``pos``. Most arms have such a
     base.
 
-    - MuJoCo 4.0 and Drake 1.51 read the pose and the mass of this body.
-    - Pinocchio 4.1 (``buildModelFromMJCF``) puts this body at the origin, and so moves the whole robot. The
-      frame of the body has no mass.
+    - MuJoCo 4.0 and Drake 1.51 read the pose of this body.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) puts this body at the origin, and so moves the whole robot.
     - PyBullet 3.2.7 lets the robot float (DX619).
 
     The effect: all poses are off by the pose of this body. If the body is rotated, Jacobians and the

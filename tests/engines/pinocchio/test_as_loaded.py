@@ -17,7 +17,7 @@ from dynx.engines.pinocchio.as_loaded import LoadedPinocchio
 from dynx.engines.pinocchio.engine_model import MAX_NV
 from dynx.errors import EngineError
 from dynx.loaded.difference import model_difference
-from dynx.model import Joint, Link, Model
+from dynx.model import Joint, Link, Model, Pose
 from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
@@ -172,3 +172,25 @@ def test_the_call_that_is_shown_loads_the_robot(base: Base, tmp_path: Path) -> N
         assert (made.nv, made.nq) == (model.nv, model.nq + 1)
         assert robot.inverse_dynamics(q, v, a).shape == (made.nv,)
     assert LoadedPinocchio.engine_version() == pinocchio.__version__
+
+
+@pytest.mark.parametrize("form", ["urdf", "mjcf"])
+def test_a_link_fixed_to_the_world_keeps_its_inertia(form: str, tmp_path: Path) -> None:
+    links = [Link(name, BODY) for name in ("world", "pedestal", "plate", "arm", "tool")]
+    if form == "mjcf":
+        links[0] = Link("world")
+    joints = [
+        Joint("mount", "fixed", "world", "pedestal"),
+        Joint("lid", "fixed", "pedestal", "plate", Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))),
+        Joint("turn", "continuous", "plate", "arm", Pose((0.0, 0.1, 0.2)), (0.0, 0.0, 1.0)),
+        Joint("weld", "fixed", "arm", "tool", Pose((0.3, 0.2, 0.1))),
+    ]
+    model = Model.build("mounted", links, joints)
+    path = tmp_path / ("robot.xml" if form == "mjcf" else "robot.urdf")
+    path.write_text(model.to_mjcf() if form == "mjcf" else model.to_urdf())
+    model = dynx.load(path)
+    with LoadedPinocchio(path, model) as robot:
+        held = robot.describe()
+    assert model_difference(model, [held]) == ()
+    assert [held.links[name].mass for name in ("pedestal", "plate")] == [BODY.mass] * 2
+    assert held.links["arm"].mass == 2 * BODY.mass
