@@ -29,8 +29,8 @@ class Bounds:
     """Largest differences over all positions within limits, with |v| <= 1 and |a| <= 1.
 
     `position` [m] is that of any point of a body within the reach of the robot, `rotation` [rad] of any body,
-    `mass_matrix` of an entry, `torque` of an entry of inverse dynamics [N m or N]. They are infinite where a difference grows without limit with the position
-    of a joint without limits.
+    `mass_matrix` of an entry, `torque` of an entry of inverse dynamics [N m or N]. They are infinite where a
+    difference grows without limit with the position of a joint without limits.
     """
 
     position: float
