@@ -42,11 +42,15 @@ def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
     return os.fdopen(descriptor, "rb")
 
 
+_LFS_POINTER = b"version https://git-lfs.github.com/spec/"
+"""First bytes of the text that a clone has in place of a large file until Git LFS fetches it."""
+
+
 def read_file(path: str) -> bytes:
     """Return the bytes of a regular file.
 
     Raises RobotNotFoundError where nothing is there, DescriptionError for a directory, a FIFO, a
-    device, a file that may not be read, or one above MAX_BYTES.
+    device, a file that may not be read, one above MAX_BYTES, or a pointer of Git LFS.
     """
     try:
         with open_regular(path) as file:
@@ -62,6 +66,11 @@ def read_file(path: str) -> bytes:
     if too_large or len(data) > MAX_BYTES:
         raise DescriptionError(
             f"is larger than {MAX_BYTES // 1024**2} MiB, the most that is read", source=printable(path)
+        )
+    if data.startswith(_LFS_POINTER):
+        raise DescriptionError(
+            "is a pointer of Git LFS in place of the file; `git lfs pull` in its repository fetches the file",
+            source=printable(path),
         )
     return data
 

@@ -95,13 +95,9 @@ def convert(model: Model, to: Format, stem: str = "robot") -> Conversion:
         raise UnknownNameError(f"format is {shown(to)}{nearest(to, get_args(Format))}")
     assets = AssetFiles(model.geometry, f"{stem}_assets", _COPIED[to])
     if to == "urdf":
-        text = urdf_text(
-            without_collision_faults(model),
-            geometry=True,
-            mesh_path=assets.mesh_path,
-            image_path=assets.image_path,
-        )
-        notes = tuple(urdf_notes(model))
+        written, left_out = _without_unread_meshes(without_collision_faults(model), assets)
+        text = urdf_text(written, geometry=True, mesh_path=assets.mesh_path, image_path=assets.image_path)
+        notes = (*urdf_notes(model), *left_out)
     else:
         writer = (
             RobotWriter(model, assets.mesh_path, assets.image_path)
@@ -136,6 +132,31 @@ def without_collision_faults(model: Model) -> Model:
         return model
     usable = {name: replace(each, collision_fault=None) for name, each in links.items()}
     return replace(model, geometry=Geometry(usable))
+
+
+def _without_unread_meshes(model: Model, assets: AssetFiles) -> tuple[Model, list[str]]:
+    """Return a robot without the shapes whose mesh files cannot be read, and a note on each of them."""
+    notes: list[str] = []
+
+    def is_read(placed: Visual | Collision, link: str) -> bool:
+        if isinstance(placed.shape, Mesh) and placed.shape.fault is None and placed.shape.file:
+            try:
+                assets.mesh_path(placed.shape)
+            except DescriptionError as error:
+                kind = "visual" if isinstance(placed, Visual) else "collision"
+                notes.append(f"A {kind} shape of link {shown(link)} is left out: {error}.")
+                return False
+        return True
+
+    links = {
+        name: replace(
+            each,
+            visuals=tuple(shape for shape in each.visuals if is_read(shape, name)),
+            collisions=tuple(shape for shape in each.collisions if is_read(shape, name)),
+        )
+        for name, each in model.geometry.links.items()
+    }
+    return (replace(model, geometry=Geometry(links)), notes) if notes else (model, notes)
 
 
 def write_document(path: Path, text: str, files: Mapping[str, bytes], *, sync: bool = True) -> list[str]:

@@ -68,3 +68,10 @@ def test_a_name_that_no_file_can_have_is_an_error_of_ours(path: str) -> None:
         read_file(path)
     assert len(str(caught.value)) < 1000
     assert str(caught.value).isprintable()
+
+
+def test_a_pointer_of_git_lfs_is_no_file(tmp_path: Path) -> None:
+    path = tmp_path / "arm.obj"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 14925\n")
+    with pytest.raises(DescriptionError, match=r"arm\.obj: is a pointer of Git LFS .*git lfs pull"):
+        read_file(str(path))
