@@ -298,8 +298,7 @@ class EpisodePage:
         poses: dict[str, Floats] = {name: T[None] for name, T in part_poses(scene, state)}
         low, high = box_around(poses, scene.bodies, robots)
         size = float(np.linalg.norm(high - low)) or 0.5
-        if not any(body.fixed for body in scene.bodies):
-            self.page.add_ground(size, float(low[2]))
+        self.page.lay_ground(size, None if any(body.fixed for body in scene.bodies) else float(low[2]))
         camera, right = (
             getattr(self._runs[0].task, "camera", None),
             np.array([1.0, 1.0, 0.0]) / math.sqrt(2.0),

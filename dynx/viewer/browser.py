@@ -33,6 +33,7 @@ from dynx.viewer.moving_picture import ALWAYS_WHOLE, COARSE_WHILE_MOVING
 from dynx.viewer.occlusion import NO_OCCLUSION, OCCLUSION
 from dynx.viewer.pose_channel import PLACING
 from dynx.viewer.shading import SHADOWS
+from dynx.viewer.surroundings import SURROUNDINGS
 from dynx.world.scenery import ROUGHNESS
 
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
@@ -514,6 +515,7 @@ _BEFORE_PICTURES = (
       watchCamera(camera);
       write(renderer.domElement, camera);
       fade();
+      surround(renderer, scene, camera);
       castShadows(renderer, camera);
       layAxesOver();
       occlude(renderer, drawn, camera);
@@ -631,7 +633,7 @@ class Client:
         self.folder = self._kept.enter_context(temporary_folder("dynx-page-"))
         """The folder that is served."""
         script = ALWAYS_WHOLE if antialiasing else COARSE_WHILE_MOVING
-        script += FIRST_PICTURE + PLACING + _PRESSES + _OWN_COLOURS + _NAMES_ON_HOVER + SHADOWS
+        script += FIRST_PICTURE + PLACING + _PRESSES + _OWN_COLOURS + _NAMES_ON_HOVER + SURROUNDINGS + SHADOWS
         script += (OCCLUSION if antialiasing else NO_OCCLUSION) + _BEFORE_PICTURES + _INPUT
         policy = ContentPolicy("'self' data: blob:")
         self.headers = tuple(policy.headers([HANDLER_HASH]))
@@ -674,7 +676,7 @@ def standalone(
     With `software` the page does not say that software draws it: its meshes were reduced for that.
     """
     policy = ContentPolicy("data: blob:")
-    script = ALWAYS_WHOLE + FIRST_PICTURE + PLACING + _OWN_COLOURS + _NAMES_ON_HOVER + SHADOWS
+    script = ALWAYS_WHOLE + FIRST_PICTURE + PLACING + _OWN_COLOURS + _NAMES_ON_HOVER + SURROUNDINGS + SHADOWS
     script += OCCLUSION + _BEFORE_PICTURES
     page = _guarded(page, script, policy)
     meta = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy.text(), quote=True)}">'

@@ -56,7 +56,7 @@ class CopiesView:
         """The names of the part under the pointer and of that which was clicked."""
         low, high = box_around(motion.poses, robots=motion.robots)
         size = float(np.linalg.norm(high - low)) or size_of(model)
-        page.add_ground(size, ground_height(low, motion.robots))
+        page.lay_ground(size, ground_height(low, motion.robots))
         page.look_at(points_around(motion.poses, robots=motion.robots), SHARE)
 
     legend = ""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError, DynxError, nearest, shown
 from dynx.model import Model
-from dynx.model.geometry import Mesh, Shape
+from dynx.model.geometry import Mesh, Plane, Shape
 from dynx.model.geometry.drawn_shapes import colliding_geometry, link_shapes, look_notes
 from dynx.model.geometry.links import Collision, Colour, Visual
 from dynx.rbd.kinematics import link_poses
@@ -443,7 +443,7 @@ class DrawnRobot(DrawnParts):
             for k, (shape, rgba, T) in enumerate(placed):
                 if rgba[3] == 0.0:
                     continue
-                path = f"{self.links[name].name}/visual{k}"
+                path = _path_below(self.links[name], "visual", k, shape)
                 budget = self._shapes.budget(shape)
                 nodes.append(_add_shape(self._scene, path, shape, rgba, T, self._look, budget))
 
@@ -515,6 +515,11 @@ def _readable(shape: Shape) -> Shape:
 def is_painted(shape: Shape) -> bool:
     """Check whether the colour of a shape changes from place to place."""
     return isinstance(shape, Mesh) and not (shape.surface.texture is None and shape.surface.colours is None)
+
+
+def _path_below(node: Any, kind: str, k: int, shape: Shape) -> str:
+    """Return the path of the node of the shape with the number `k` of a part; the page finds planes by it."""
+    return f"{node.name}/{'plane' if isinstance(shape, Plane) else kind}{k}"
 
 
 def _add_shape(
@@ -859,7 +864,7 @@ class DrawnScene(DrawnParts):
 
 def _add_body(scene: Any, node: Any, body: SceneBody, look: Look) -> Iterator[Any]:
     for k, (shape, rgba, T) in enumerate(body.drawn_shapes()):
-        yield _add_shape(scene, f"{node.name}/shape{k}", shape, rgba, T, look, look.triangles)
+        yield _add_shape(scene, _path_below(node, "shape", k, shape), shape, rgba, T, look, look.triangles)
 
 
 THICKNESS = 0.009

@@ -327,8 +327,7 @@ class MotionView:
         self._start = float(motion.t[0])
         low, high = box_around(motion.poses, motion.bodies, motion.robots)
         self._size = float(np.linalg.norm(high - low)) or 0.3
-        if not has_ground(motion.bodies):
-            page.add_ground(self._size)
+        page.lay_ground(self._size, None if has_ground(motion.bodies) else 0.0)
         with page.together():
             self.drawn = DrawnScene(page.scene, "/motion", motion.robots, motion.bodies, look)
             self._ghost_drawn = None if ghost is None else self._draw_ghost(ghost, look)

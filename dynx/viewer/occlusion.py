@@ -108,7 +108,7 @@ OCCLUSION = (
       return sum.y > 0.0 ? sum.x / sum.y : 1.0;
     }
     void main() {`;
-  // The ground of a page is seen through: what it gets less light by is laid over it.
+  // What a ground gets less light by is laid over it.
   const VEIL = [`
     varying float depth;
     void main() {
@@ -178,8 +178,10 @@ OCCLUSION = (
     const quad = new plane.constructor(plane.geometry, drawn(OPENNESS, {depthTest: false, depthWrite: false,
       uniforms: {surfaces: {value: surfaces.texture}, slopes: {value: [1, 1]}, reach: shared.reach}}));
     const veil = new plane.constructor(plane.geometry, drawn(VEIL, {transparent: true, blending: 1,
-      depthWrite: false, uniforms: shared}));
+      depthWrite: false, uniforms: shared, polygonOffset: true, polygonOffsetFactor: -1,
+      polygonOffsetUnits: -4}));
     veil.raycast = () => {};
+    veil.matrixAutoUpdate = false;
     quad.frustumCulled = false;
     table.add(quad);
     stage.matrixWorldAutoUpdate = false;
@@ -202,15 +204,15 @@ OCCLUSION = (
   };
   const isFlat = ({min, max}) => Math.min(max.x - min.x, max.y - min.y, max.z - min.z) === 0;
   const layVeil = (box, reach) => {
-    const nodes = window.__viserMutable.nodeRefFromName, world = nodes[""], ground = nodes["/ground"];
-    const {veil} = tools;
-    veil.visible = !!world && !!ground?.visible;
+    const world = window.__viserMutable.nodeRefFromName[""], {veil} = tools;
+    veil.visible = !!world && !!ground;
     if (!veil.visible) return;
     if (veil.parent !== world) world.add(veil);
-    const own = box.clone().applyMatrix4(world.matrixWorld.clone().invert());
-    own.getCenter(veil.position).z = ground.position.z;
+    const own = box.clone().applyMatrix4(world.matrixWorld.clone().multiply(ground.matrix).invert());
+    own.getCenter(veil.position).z = 0;
     own.getSize(veil.scale).addScalar(4 * reach).z = 1;
     veil.updateMatrix();
+    veil.matrix.premultiply(ground.matrix);
     veil.updateMatrixWorld(true);
   };
   const findOpenness = (renderer, camera, meshes) => {
@@ -242,7 +244,7 @@ OCCLUSION = (
     const meshes = [];
     let all = null;
     scene.traverseVisible((each) => {
-      const materials = each.isMesh && !each.isSkinnedMesh && each !== shadow ? [each.material].flat() : [];
+      const materials = each.isMesh && !each.isSkinnedMesh ? [each.material].flat() : [];
       const isSolid = (own) => own.isMeshStandardMaterial && !own.transparent && !own.wireframe;
       if (!materials.length || !materials.every(isSolid)) return;
       materials.forEach(patch);

@@ -21,18 +21,11 @@ from dynx.steppers.camera import Camera
 from dynx.viewer.browser import Access, CheckedMessages, Client, is_loopback
 from dynx.viewer.framing import fitted_view, round_length
 from dynx.viewer.library import serve, silent
+from dynx.viewer.surroundings import GROUND, SKY_LIGHT, tiles_element
 from dynx.world.scenery import DARK, FILL_DIRECTION, GAMMA, KEY_DIRECTION, LIGHT
 
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
-
-_CELLS = 12
-"""Number of cells along each side of the ground."""
-_PIECES = 6
-"""Number of pieces of each line of the ground in a plain picture. Of a long piece that goes past the camera
-parts are missing, or lie before what hides them."""
-_LINE_COLOUR = {False: (170, 170, 170), True: (70, 70, 70)}
-"""Colour of the lines of the ground on a light and on a dark page."""
 
 _STYLE = """<style>
 @media (max-width: %dpx) {
@@ -87,8 +80,8 @@ class Page:
         plain: bool = False,
     ) -> None:
         """`plain` is what software draws fastest: one lamp and a sky, without shadows, instead of viser's
-        surroundings and four lamps, whose reflections take most of the time of a picture, a ground of lines
-        instead of a shader, and no antialiasing.
+        surroundings and four lamps, whose reflections take most of the time of a picture, and no
+        antialiasing.
 
         Raises ArgumentError for a port that is taken and a host that is not of this machine."""
         if not isinstance(host, str) or not host:
@@ -153,7 +146,7 @@ class Page:
         for name, amount, towards in lights:
             scene.add_light_directional(name, intensity=math.pi * amount, position=tuple(towards.tolist()))
         scene.add_light_hemisphere(
-            "/sky",
+            SKY_LIGHT,
             ground_color=(below, below, below),
             intensity=math.pi * scenery.sky_light,
             position=(0.0, 0.0, 1.0),
@@ -201,29 +194,13 @@ class Page:
         context: AbstractContextManager[Any] = self._server.atomic()
         return context
 
-    def add_ground(self, size: float, height: float = 0.0) -> None:
-        """Add a square grid at a height [m], whose cells have a round length of about half the `size` of what
-        stands on it [m]."""
-        cell = round_length(0.5 * size)
-        side = _CELLS * cell
-        if not self.plain:
-            self.scene.add_grid(
-                "/ground", side, side, cell_size=0.2 * cell, section_size=cell, position=(0.0, 0.0, height)
-            )
-            return
-        across, along = np.linspace(-0.5, 0.5, _CELLS + 1), np.linspace(-0.5, 0.5, _PIECES + 1)
-        x, y = np.broadcast_arrays(along * side, across[:, None] * side)
-        points = np.stack([x, y, np.zeros_like(x)], axis=-1)
-        pieces = np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)
-        lines = np.concatenate([pieces, pieces[:, :, [1, 0, 2]]]).astype(np.float32)
-        self.scene.add_line_segments(
-            "/ground",
-            lines,
-            _LINE_COLOUR[self.dark],
-            thickness=1.0,
-            thickness_units="screen",
-            position=(0.0, 0.0, height),
-        )
+    def lay_ground(self, size: float, height: float | None = 0.0) -> None:
+        """Give planes tiles, whose edges have a round length of about half the `size` of what stands on them
+        [m], and add a ground at a height [m], unless it is None."""
+        self.elements["tiles"] = tiles_element(round_length(0.5 * size))
+        self.gui.add_html(self.elements["tiles"], order=math.inf)
+        if height is not None:
+            self.scene.add_frame(GROUND, show_axes=False, position=(0.0, 0.0, height))
 
     def look_at(self, points: Floats, share: float) -> None:
         """Begin with a camera for which points (n, 3) [m] take a `share` of the height of the picture, or of

@@ -475,7 +475,7 @@ class RobotView:
         places = {f"{model.name}/{link}": self.robot.pose(link)[None] for link in self.robot.links}
         low, high = box_around(places, robots={model.name: model})
         # A humanoid whose base is its pelvis stands above the ground, too.
-        page.add_ground(float(np.linalg.norm(high - low)) or size, min(float(low[2]), 0.0))
+        page.lay_ground(float(np.linalg.norm(high - low)) or size, min(float(low[2]), 0.0))
         page.look_at(points_around(places, robots={model.name: model}), SHARE)
 
     @property

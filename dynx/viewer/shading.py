@@ -17,7 +17,7 @@ SHADOWS = (
     f"const TOWARDS = {json.dumps(KEY_DIRECTION.tolist())}, CELLS = {CELLS};"
     + """
   // Ghosts, which lie below the node /second, have no shadow, as in pictures.
-  const CASTS = /^\\/(motion|robot|world)\\/(.*\\/)?(visual|shape)\\d+$/;
+  const CASTS = /^\\/(motion|robot|world|first)\\/(.*\\/)?(visual|shape)\\d+$/;
   const outlines = new WeakMap();
   const outlined = (geometry, cells) => {
     const given = geometry.attributes.position, index = geometry.index, count = given.count;
@@ -45,37 +45,25 @@ SHADOWS = (
     }
     return {points, faces};
   };
-  let shadow = null, casting = null, castFrom = [], castAt = null;
-  const addShadow = (mesh) => {
-    const Mesh = mesh.constructor, Geometry = mesh.geometry.constructor, material = mesh.material.clone();
-    material.onBeforeCompile = (shader) => {
-      shader.fragmentShader = "uniform vec3 diffuse; void main() { gl_FragColor = vec4(diffuse, 1.0); }";
-    };
-    material.customProgramCacheKey = () => "dynx-shadow";
-    // Just below the lines of the ground.
-    Object.assign(material, {side: 2, transparent: false, opacity: 1, flatShading: false, map: null,
-      vertexColors: false, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4});
-    shadow = new Mesh(new Geometry(), material);
-    shadow.frustumCulled = false;
-    shadow.raycast = () => {};
-  };
+  let casting = null, castFrom = [], castAt = null;
   const castShadows = (renderer, camera) => {
-    const nodes = window.__viserMutable.nodeRefFromName, world = nodes[""], ground = nodes["/ground"];
+    const nodes = window.__viserMutable.nodeRefFromName, world = nodes[""], shadow = surroundings?.shadow;
     if (shadow) shadow.visible = false;
-    if (!world || !ground?.visible) return;
+    // A plane that light meets from behind has no shadows.
+    const towardsKey = (axis) =>
+      ground.matrix.elements.slice(4 * axis, 4 * axis + 3).reduce((sum, e, k) => sum + e * TOWARDS[k], 0);
+    const facing = ground && towardsKey(2);
+    if (!world || !(facing > 1e-3)) return;
     const meshes = [];
     for (const path in nodes) {
       if (!nodes[path] || !CASTS.test(path)) continue;
-      let above = nodes[path];
-      while (above?.visible) above = above.parent;
-      if (above) continue;
+      if (!isVisible(nodes[path])) continue;
       nodes[path].traverseVisible((each) => {
         const solid = each.isMesh && !each.isInstancedMesh && !Array.isArray(each.material);
         if (solid && each.material.isMeshStandardMaterial && each.material.opacity > 0.5) meshes.push(each);
       });
     }
     if (!meshes.length) return;
-    if (!shadow) addShadow(meshes[0]);
     if (shadow.parent !== world) world.add(shadow);
     const of = meshes.map((mesh) => {
       const {geometry} = mesh, level = levelWhileMoving(mesh, renderer, camera);
@@ -95,7 +83,7 @@ SHADOWS = (
         for (const k of own) faces.push(first + k);
         first += points.length / 3;
       }
-      const Attribute = meshes[0].geometry.attributes.position.constructor;
+      const {Attribute} = surroundings;
       shadow.geometry.dispose();
       shadow.geometry = new shadow.geometry.constructor();
       shadow.geometry.setAttribute("position", new Attribute(new Float32Array(3 * first), 3));
@@ -103,10 +91,12 @@ SHADOWS = (
       castFrom = [];
     }
     const position = shadow.geometry.attributes.position, to = position.array;
-    const height = ground.position.z, across = TOWARDS[0] / TOWARDS[2], along = TOWARDS[1] / TOWARDS[2];
-    const inverse = world.matrixWorld.clone().invert(), pose = inverse.clone();
-    if (height !== castAt) castFrom = [];
-    castAt = height;
+    // In the axes of the ground.
+    const inverse = world.matrixWorld.clone().multiply(ground.matrix).invert(), pose = inverse.clone();
+    const onGround = ground.matrix.elements.join();
+    if (onGround !== castAt) castFrom = [];
+    castAt = onGround;
+    const [across, along] = [0, 1].map((k) => towardsKey(k) / facing);
     let place = 0;
     meshes.forEach((mesh, number) => {
       const e = pose.multiplyMatrices(inverse, mesh.matrixWorld).elements, {points} = of[number];
@@ -119,14 +109,15 @@ SHADOWS = (
       position.needsUpdate = true;
       for (let k = 0; k < points.length; k += 3) {
         const x = points[k], y = points[k + 1], z = points[k + 2];
-        const above = Math.max(e[2] * x + e[6] * y + e[10] * z + e[14] - height, 0);
+        const above = Math.max(e[2] * x + e[6] * y + e[10] * z + e[14], 0);
         to[place++] = e[0] * x + e[4] * y + e[8] * z + e[12] - across * above;
         to[place++] = e[1] * x + e[5] * y + e[9] * z + e[13] - along * above;
-        to[place++] = height;
+        to[place++] = 0;
       }
     });
-    const dark = document.documentElement.dataset.mantineColorScheme === "dark";
-    shadow.material.color.r = shadow.material.color.g = shadow.material.color.b = dark ? 0.04 : 0.8;
+    shadow.matrix.copy(ground.matrix);
+    shadow.updateMatrixWorld(true);
+    setValues(shadow, ground.values);
     shadow.visible = true;
   };
   // Axes of frames are seen through the parts in which they lie.

@@ -186,8 +186,7 @@ class WorldView:
         self._spring = Spring(page.scene, 0.3 * self._size)
         self._pushes: list[ExternalForce] = []
         self._running = threading.Event()
-        if not has_ground(scene.bodies):
-            page.add_ground(self._size)
+        page.lay_ground(self._size, None if has_ground(scene.bodies) else 0.0)
         self._add_controls(moving, steps=steps, collisions_first=collisions)
         self.drawn.show(visuals=not collisions, collisions=collisions)
         self.camera = FollowingCamera(page, self.drawn)

@@ -34,7 +34,14 @@ SUBTILES = 5
 TILE_CONTRAST, SUBTILE_CONTRAST = 0.11, 0.022
 """Shares by which tiles are lighter or darker than the colour of their plane."""
 
-_HAZE = 0.12
+ZENITH = 0.45
+"""Sine of the elevation from which on the sky has the colour of the zenith."""
+
+HAZE_BELOW, HAZE_SHARE = 0.6, 0.6
+"""Sine of the angle below the horizon from which on haze has its darkest colour, and the share of the ground
+in that colour."""
+
+HAZE = 0.12
 """Sine of the angle between a ray and a plane below which the plane vanishes in the colour of the horizon."""
 
 _GRAZING = 0.3
@@ -130,14 +137,14 @@ class Scenery(NamedTuple):
         of haze below it."""
         height = rays[:, 2:]
         horizon, zenith, ground = (np.array(each) for each in (self.horizon, self.zenith, self.ground))
-        above = horizon + (zenith - horizon) * np.clip(height / 0.45, 0.0, 1.0)
-        below = horizon + 0.6 * (ground - horizon) * np.clip(-height / 0.6, 0.0, 1.0)
+        above = horizon + (zenith - horizon) * np.clip(height / ZENITH, 0.0, 1.0)
+        below = horizon + HAZE_SHARE * (ground - horizon) * np.clip(-height / HAZE_BELOW, 0.0, 1.0)
         return np.asarray(np.where(height >= 0.0, above, below), dtype=np.float64)
 
     def haze(self, colours: Floats, slope: Floats) -> Floats:
         """Return the colours (n, 3) of planes that rays meet at angles with the sines `slope` (n,): far away
         they become that of the horizon."""
-        share = np.clip(slope / _HAZE, 0.0, 1.0)[:, None]
+        share = np.clip(slope / HAZE, 0.0, 1.0)[:, None]
         return np.asarray(np.array(self.horizon) + share * (colours - np.array(self.horizon)))
 
 

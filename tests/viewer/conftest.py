@@ -15,6 +15,7 @@ from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer import Viewer
 from dynx.viewer.drawn_robot import DrawnParts
+from dynx.viewer.surroundings import GROUND, SKY_LIGHT
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
@@ -126,6 +127,12 @@ def connected(viewer: Viewer, count: int = 1) -> list[Any]:
     until(ready, f"{count} connected pages")
     clients = viewer.page.server.get_clients()
     return [clients[k] for k in sorted(clients)]
+
+
+def without_surroundings(viewer: Viewer) -> None:
+    """Remove ground and sky from a page: its pictures are transparent where no part is."""
+    for path in (GROUND, SKY_LIGHT):
+        viewer.page.scene.remove_by_name(path)
 
 
 def poses_of_nodes(drawn: DrawnParts) -> dict[str, Floats]:

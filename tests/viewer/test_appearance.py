@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -67,7 +67,7 @@ RATIO = "window.__viserMutable?.scene?.__r3f?.root?.getState?.()?.viewport?.dpr"
 """Pixels of the picture for a pixel of the page, in its script."""
 
 
-def colour_at(page: Any, place: Floats) -> Floats:
+def colour_at(page: Any, place: Sequence[float] | Floats) -> Floats:
     """Return the colour (3,) at a place (2,) [pixels] of the page, once it is drawn whole: while something
     moves, software draws it with fewer pixels and without gloss."""
     page.wait_for_function(f"() => {RATIO} !== {MOVING}")

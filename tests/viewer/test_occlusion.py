@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +27,8 @@ SHADE = (0.85, 0.985)
 ROUNDING = 1.5
 """Largest difference of a value of a colour, of 255, that is none."""
 
-SHADED, WHITE = 251.0, 253.0
-"""Brightness of the ground, below the first in the shade, above the second elsewhere."""
+LEAST_SHADE = 1.0
+"""Least difference of the brightness of the ground that shade makes, of 255."""
 
 ALIKE = 0.02
 """Difference between the shares that stay in the page and in pictures, in 95 % of the pixels. Pictures also
@@ -126,18 +126,30 @@ def test_surfaces_are_darker_where_they_meet_as_in_pictures(
     assert np.quantile(np.abs(kept[0] - kept[1])[sand], 0.95) <= ALIKE
 
 
+def rested(value: Callable[[], float]) -> float:
+    """Return a value once it is the same four times, one after another."""
+    values = [value()]
+
+    def rests() -> bool:
+        values.append(value())
+        return len(values) > 3 and len(set(values[-4:])) == 1
+
+    until(rests, "a picture at rest")
+    return values[-1]
+
+
 def test_what_moves_takes_its_shade_along(open_page: OpenPage) -> None:
     near, far = np.array([0.23, -0.515, 0.0]), np.array([0.27, -0.73, 0.0])
     with dynx.load(CORNER).view(whole_meshes=True) as viewer:
         page = open_page(viewer.url, accelerated=True)
         (client,) = connected(viewer)
         bright = brightness(viewer, client, VIEW.size)
-        until(lambda: bright(near) < SHADED, "the shade beside what stands on the ground")
-        assert bright(far) > WHITE
+        shaded, clear = rested(lambda: bright(near)), bright(far)
         viewer.update([1.0])
-        until(lambda: bright(near) > WHITE, "the ground without it")
+        until(lambda: bright(near) > shaded + LEAST_SHADE, "the ground without the shade")
+        assert bright(far) == pytest.approx(clear, abs=0.5 * LEAST_SHADE)
         viewer.update([0.0])
-        until(lambda: bright(near) < SHADED, "the shade again")
+        until(lambda: abs(bright(near) - shaded) < 0.5 * LEAST_SHADE, "the shade again")
         assert page.errors == []
 
 

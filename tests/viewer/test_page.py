@@ -38,6 +38,7 @@ from tests.viewer.conftest import (
     pixel_of,
     poses_of_nodes,
     until,
+    without_surroundings,
 )
 
 SAME = 0.93
@@ -74,7 +75,7 @@ def test_the_page_shows_what_the_camera_of_the_world_sees(open_page: OpenPage) -
     model = dynx.load("ur5")
     camera = Camera.look_at((1.3, -1.3, 0.8), (0.2, 0.0, 0.3), size=(320, 240))
     with view(model, whole_meshes=True) as viewer:
-        viewer.page.scene.remove_by_name("/ground")
+        without_surroundings(viewer)
         page = open_page(viewer.url)
         for seed in (0, 1):
             q = model.random(seed)

@@ -16,7 +16,7 @@ from tests.viewer.conftest import PATIENCE, OpenPage, connected, pixel_of, until
 
 SIDE, COLOUR = 0.3, 0.5
 
-SHADED, CLEAR = 220.0, 235.0
+SHADED, CLEAR = 122.0, 126.0
 """Brightness of the ground, below the first in the shadow, above the second in the light."""
 
 LIFT = f"""<robot name="lift"><link name="base"/>
@@ -50,7 +50,7 @@ def test_the_shadow_of_a_part_lies_where_the_key_light_casts_it(open_page: OpenP
 
 def brightness(viewer: Viewer, client: Any, size: tuple[int, int]) -> Callable[[Floats], float]:
     """Return a function of a point (3,) of the world that returns the brightness of the picture there, from 0
-    to 255, beside the lines of the ground."""
+    to 255."""
 
     def seen(point: Floats) -> float:
         picture = viewer.screenshot(size, timeout=PATIENCE)

@@ -16,7 +16,7 @@ from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
 from dynx.viewer import Viewer
 from tests.conftest import needs_examples
-from tests.viewer.conftest import PATIENCE, OpenPage, connected, until
+from tests.viewer.conftest import PATIENCE, OpenPage, connected, until, without_surroundings
 from tests.viewer.test_page import drawn_silhouette, rendered_silhouette
 
 SAME = 0.93
@@ -30,7 +30,7 @@ def test_a_reduced_robot_has_the_silhouette_of_the_whole_one(open_page: OpenPage
     with model.view(whole_meshes=False) as viewer:
         drawn, whole = viewer.view.robot._shapes._reduced
         assert drawn < 0.5 * whole
-        viewer.page.scene.remove_by_name("/ground")
+        without_surroundings(viewer)
         page = open_page(viewer.url)
         q = model.random(1)
         viewer.view.put(q)
@@ -83,7 +83,7 @@ def test_the_hollow_of_a_concave_mesh_is_open_where_its_pieces_collide(
     hollow, board = np.array([0.5, 0.45, 0.5]), np.array([0.05, 0.45, 0.5])
     camera = Camera.look_at((0.5, 0.45, 3.0), (0.5, 0.45, 0.0), up=(0.0, 1.0, 0.0), size=(320, 240))
     with dynx.load(tmp_path / "channel.urdf").view(collisions=True) as viewer:
-        viewer.page.scene.remove_by_name("/ground")
+        without_surroundings(viewer)
         page = open_page(viewer.url)
         connected(viewer)
 
@@ -144,7 +144,7 @@ def test_an_edge_is_as_sharp_as_its_file_says(
     open_page: OpenPage, tmp_path: Path, smooth: bool, software: bool
 ) -> None:
     with dynx.load(roof(tmp_path, smooth=smooth)).view(whole_meshes=not software) as viewer:
-        viewer.page.scene.remove_by_name("/ground")
+        without_surroundings(viewer)
         page = open_page(viewer.url)
 
         def as_wanted() -> bool:
