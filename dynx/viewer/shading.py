@@ -117,7 +117,7 @@ SHADOWS = (
     });
     shadow.matrix.copy(ground.matrix);
     shadow.updateMatrixWorld(true);
-    setValues(shadow, ground.values);
+    setValues(shadow, {...ground.values, light: ground.values.shade});
     shadow.visible = true;
   };
   // Axes of frames are seen through the parts in which they lie.

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from html import escape
 
-from dynx.spatial.scalar import Floats
 from dynx.world.scenery import (
     DARK,
     FILL_DIRECTION,
@@ -42,10 +41,6 @@ def tiles_element(tile: float) -> str:
     return f'<div id="{TILES}" style="display: none" data-tile="{escape(repr(tile), quote=True)}"></div>'
 
 
-def _vector(values: Floats) -> str:
-    return f"vec3({', '.join(map(repr, values.tolist()))})"
-
-
 _VALUES = {
     "ZENITH": ZENITH,
     "HAZE": HAZE,
@@ -54,9 +49,6 @@ _VALUES = {
     "SUBTILES": float(SUBTILES),
     "TILE_CONTRAST": TILE_CONTRAST,
     "SUBTILE_CONTRAST": SUBTILE_CONTRAST,
-    "TO_KEY": _vector(KEY_DIRECTION),
-    "TO_FILL": _vector(FILL_DIRECTION),
-    "EXPONENT": 1.0 / GAMMA,
 }
 _DEFINED = "".join(f"#define {name} {value}\n" for name, value in _VALUES.items())
 
@@ -65,21 +57,24 @@ _RINGS = [0.5 * 4.0**k for k in range(7)]
 lines near the eye the graphics processor would round places on the plane too much."""
 
 
-def _uniforms(scenery: Scenery) -> dict[str, tuple[float, ...]]:
-    """Return the inputs of the programs that depend on whether the page is dark."""
-    amounts = (scenery.sky_light, scenery.ground_light, scenery.fill, scenery.key)
+def _values(scenery: Scenery) -> dict[str, object]:
+    """Return what depends on whether the page is dark: colours, and amounts of light."""
     return {
         "zenith": scenery.zenith,
         "horizon": scenery.horizon,
         "nadir": scenery.ground,
-        "amounts": amounts,
+        "key": scenery.key,
+        "fill": scenery.fill,
+        "above": scenery.sky_light,
+        "below": scenery.ground_light,
     }
 
 
 SURROUNDINGS = (
     f"const [TILES, GROUND, SKY_LIGHT] = {json.dumps([TILES, GROUND, SKY_LIGHT])}, TILE = {TILE};"
-    f"const SKY_VALUES = {json.dumps(_uniforms(LIGHT))}, DARK_SKY_VALUES = {json.dumps(_uniforms(DARK))};"
+    f"const SCENERY = {json.dumps(_values(LIGHT))}, DARK_SCENERY = {json.dumps(_values(DARK))};"
     f"const DEFINED = {json.dumps(_DEFINED)}, RINGS = {json.dumps(_RINGS)}, GAMMA = {GAMMA};"
+    f"const [TO_KEY, TO_FILL] = {json.dumps([KEY_DIRECTION.tolist(), FILL_DIRECTION.tolist()])};"
     + """
   const SKY = [`
     varying vec3 ray;
@@ -87,7 +82,12 @@ SURROUNDINGS = (
       vec2 place = 2.0 * position.xy;
       vec2 slope = (place + projectionMatrix[2].xy) / vec2(projectionMatrix[0][0], projectionMatrix[1][1]);
       ray = transpose(mat3(modelViewMatrix)) * vec3(slope, -1.0);
-      gl_Position = vec4(place, 0.5, 1.0);
+      // As far away as can be.
+      #ifdef USE_REVERSED_DEPTH_BUFFER
+        gl_Position = vec4(place, 0.0, 1.0);
+      #else
+        gl_Position = vec4(place, 1.0, 1.0);
+      #endif
     }`, `
     ${DEFINED}
     uniform vec3 zenith, horizon, nadir;
@@ -112,10 +112,9 @@ SURROUNDINGS = (
       gl_Position = projectionMatrix * (modelViewMatrix * vec4(foot + place, 0.0, 1.0));
     }`, `
     ${DEFINED}
-    uniform vec3 horizon, colour, normal;
-    uniform vec4 amounts;
+    uniform vec3 horizon, colour;
     uniform vec2 phase;
-    uniform float tile, reach, pixel, opacity;
+    uniform float tile, reach, pixel, light, opacity;
     varying vec2 place;
     float waves(float edge, float extent) {
       vec2 at = (phase + place) / edge, within = fract(at);
@@ -126,12 +125,7 @@ SURROUNDINGS = (
     void main() {
       float away = length(vec3(place, reach)), slope = reach / away, extent = pixel * away / slope;
       float tiles = TILE_CONTRAST * waves(tile, extent) + SUBTILE_CONTRAST * waves(tile / SUBTILES, extent);
-      float light = mix(amounts.y, amounts.x, 0.5 + 0.5 * normal.z);
-      light += amounts.z * max(dot(normal, TO_FILL), 0.0);
-      #ifndef SHADOW
-        light += amounts.w * max(dot(normal, TO_KEY), 0.0);
-      #endif
-      vec3 lit = min((1.0 + tiles) * colour, 1.0) * pow(light, EXPONENT);
+      vec3 lit = light * min((1.0 + tiles) * colour, 1.0);
       gl_FragColor = vec4(mix(horizon, lit, min(slope / HAZE, 1.0)), opacity);
     }`];
   // The page does not tell its classes: its objects have them.
@@ -155,15 +149,13 @@ SURROUNDINGS = (
     const spread = new Geometry();
     spread.setAttribute("position", new Attribute(new Float32Array(points), 3));
     spread.setIndex(faces);
-    const inputs = ["horizon", "amounts", "colour", "normal", "opacity", "foot", "phase", "tile", "reach",
-      "pixel"];
+    const inputs = ["horizon", "colour", "light", "opacity", "foot", "phase", "tile", "reach", "pixel"];
     const plane = (geometry, more) => drawn(geometry, PLANE, inputs, {side: 2, ...more});
-    const once = {depthTest: false, depthWrite: false};
-    const sky = drawn(picture.geometry, SKY, ["zenith", "horizon", "nadir"], once);
-    const shadow = plane(new Geometry(), {defines: {SHADOW: 1}, ...once});
-    // The shadow is laid over the ground, which is the first plane, before there is anything else.
-    sky.renderOrder = -4;
+    const sky = drawn(picture.geometry, SKY, ["zenith", "horizon", "nadir"], {depthWrite: false});
+    const shadow = plane(new Geometry(), {defines: {SHADOW: 1}, depthTest: false, depthWrite: false});
+    // The shadow is laid over the ground before there is anything else. The sky fills what is left.
     shadow.renderOrder = -2;
+    sky.renderOrder = 1;
     shadow.visible = false;
     return {behind, sky, shadow, addPlane: () => plane(spread), Attribute, planes: []};
   };
@@ -182,10 +174,14 @@ SURROUNDINGS = (
     const opacity = own?.transparent ? own.opacity : 1;
     const colour = own ? own.color.toArray().map((each) => each ** (1 / GAMMA)) : seen.nadir;
     const phase = [eye.x, eye.y].map((each) => each - 2 * tile * Math.floor(each / (2 * tile)));
-    const normal = [side * e[8], side * e[9], side * e[10]], reach = Math.max(Math.abs(eye.z), 1e-6);
-    return {...seen, opacity, colour, phase, normal, reach, foot: [eye.x, eye.y]};
+    const normal = [8, 9, 10].map((k) => side * e[k]);
+    const facing = (towards) => Math.max(towards.reduce((sum, each, k) => sum + normal[k] * each, 0), 0);
+    const around = seen.below + (seen.above - seen.below) * (0.5 + 0.5 * normal[2]);
+    const shaded = around + seen.fill * facing(TO_FILL), lit = shaded + seen.key * facing(TO_KEY);
+    return {...seen, opacity, colour, phase, light: lit ** (1 / GAMMA), shade: shaded ** (1 / GAMMA),
+      reach: Math.max(Math.abs(eye.z), 1e-6), foot: [eye.x, eye.y]};
   };
-  // The ground is the first opaque plane: its pose in the world, and the inputs of its program.
+  // The ground is the first opaque plane: its pose in the world, and what its program is given.
   let surroundings, ground = null;
   const drawSurroundings = (renderer, scene, camera) => {
     const nodes = window.__viserMutable.nodeRefFromName, world = nodes[""];
@@ -194,7 +190,7 @@ SURROUNDINGS = (
     const {behind, sky, planes, addPlane} = surroundings;
     const dark = document.documentElement.dataset.mantineColorScheme === "dark";
     const {height} = renderer.getRenderTarget() ?? renderer.domElement;
-    const seen = {...(dark ? DARK_SKY_VALUES : SKY_VALUES),
+    const seen = {...(dark ? DARK_SCENERY : SCENERY),
       pixel: 2 / (camera.projectionMatrix.elements[5] * height),
       tile: Number(document.getElementById(TILES)?.dataset.tile ?? TILE)};
     if (sky.parent !== world) world.add(sky);
