@@ -14,8 +14,7 @@ from benchmarks.mesh_colours import by_page
 from dynx.model.elements import Pose
 from dynx.steppers.camera import Camera
 from dynx.viewer.surroundings import GROUND, SKY_LIGHT, SURROUNDINGS
-from dynx.world import Material, Scene, SceneBody, World, ground
-from dynx.world.scene import box
+from dynx.world import Material, Scene, SceneBody, World, box, ground
 from tests.viewer.conftest import OpenPage, connected, until
 from tests.viewer.test_appearance import colour_at
 
