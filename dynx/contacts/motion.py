@@ -11,6 +11,7 @@ import numpy as np
 
 from dynx.model import Pose
 from dynx.model.geometry import Box, Collision, Cylinder, Shape, Sphere
+from dynx.model.tree import STANDARD_GRAVITY
 from dynx.spatial.scalar import Floats
 from dynx.world import Material, Scene, SceneBody, World, WorldState, ground, sphere
 
@@ -52,7 +53,7 @@ def step_count(world: World, duration: float) -> int:
 
 
 def mean_contact_force(world: World, part: str) -> Floats:
-    """Return the mean (3,) of the contact forces on a body or link in the interval of the case [N]."""
+    """Return the mean (3,) of the contact forces on a part over the world's `contact_interval` [N]."""
     total: Floats = np.zeros(3)
     for contact in world.mean_contacts(part):
         total += contact.force if contact.a == part else -contact.force
@@ -71,14 +72,15 @@ def tilts(rotations: Floats) -> Floats:
 
 
 def rate_at(angle: float, angles: Floats, rates: Floats) -> float:
-    """Return the rate where angles (n,) first exceed `angle`, by linear interpolation; 0 if none does."""
+    """Return the rate where angles (n,) first exceed `angle`, by linear interpolation; 0 if none does, or the
+    first one already does."""
     after = int(np.argmax(angles > angle))
     return (
         float(np.interp(angle, angles[after - 1 : after + 1], rates[after - 1 : after + 1])) if after else 0.0
     )
 
 
-G = 9.81
+G = -STANDARD_GRAVITY[2]
 """Magnitude of gravity [m/s^2]."""
 
 
@@ -192,7 +194,7 @@ def after_bounce(throw: Throw) -> tuple[float, float]:
     """Return the speed along the ground and the backspin [m/s] of a homogeneous ball after an impact.
 
     The normal impulse per mass is (1 + e) times the speed of the fall. Friction opposes the slip of the
-    lowest point, in proportion to it, until the slip is zero.
+    lowest point, in proportion to the normal impulse, until the slip is zero.
     """
     impulse = min(throw.friction * (1.0 + throw.restitution) * throw.fall, throw.sticking_impulse)
     impulse = math.copysign(impulse, throw.speed + throw.backspin)

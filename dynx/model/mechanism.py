@@ -61,7 +61,8 @@ class Body:
 
     @property
     def about_z(self) -> bool:
-        """True if the body rotates about the z axis of its joint frame; False if it stands for several."""
+        """True if the body rotates about the z axis of its joint frame; False if `axis` is a stack of axes of
+        several bodies."""
         return self.revolute and self.ball is None and self.axis.ndim == 1 and all(self.axis == (0, 0, 1))
 
 
@@ -177,7 +178,8 @@ class Mechanism:
 
     @cached_property
     def places(self) -> tuple[int, ...]:
-        """Index in q of each coordinate of the tree, and of any number of a base or of a ball joint."""
+        """Index in q of each tree coordinate; for a ball joint where its quaternion begins, for a base an
+        index not to be used."""
         places, at = [*range(6)] if self.floating else [], 7 if self.floating else 0
         for body in self.bodies:
             places.append(at)
@@ -237,7 +239,7 @@ def rate_products(mechanism: Mechanism, v: Array) -> Array:
 
 def joint_entries(mechanism: Mechanism, x: Array) -> list[Array]:
     """Return the entries (...,) for each body's joint of a tree configuration or velocity (..., n); those
-    of a ball joint in a configuration are its quaternion (..., 4)."""
+    of a ball joint in a configuration are a quaternion xyzw (..., 4)."""
     end, n = x.shape[-1], len(mechanism.bodies)
     if not mechanism.balls or end != mechanism.nq:
         return [np.asarray(x[..., k]) for k in range(end - n, end)]

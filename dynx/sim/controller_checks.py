@@ -67,7 +67,8 @@ def refuse_wrong_random_size(controller: Controller[Any]) -> None:
 
 
 def controller_numbers(controller: Controller[Any]) -> dict[str, Any]:
-    """Return public numbers of a controller and its inner one, such as gains, in types that JSON has."""
+    """Return the public numbers and texts of a controller and of its inner one, such as gains, and the names
+    of its backends, in types that JSON has; attributes of other kinds are left out."""
     found: dict[str, Any] = {}
     for name, value in sorted(attributes_of(controller).items()):
         if name.startswith("_"):
@@ -76,16 +77,27 @@ def controller_numbers(controller: Controller[Any]) -> dict[str, Any]:
             with entered(controller), entered(value) as place:
                 inside = {} if place is not None else controller_numbers(value)
             found[name] = {"law": value.name, **inside}
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
-            digest = sha256(np.ascontiguousarray(value).tobytes())
-            found[name] = (
-                value.tolist() if value.size <= MAX_LISTED_NUMBERS else f"sha256 {digest.hexdigest()}"
-            )
         elif isinstance(value, Backend):
             found[name] = value.name
         elif value is None or isinstance(value, bool | int | float | str):
             found[name] = value
+        elif (array := _array_of_numbers(value)) is not None:
+            digest = sha256(np.ascontiguousarray(array).tobytes())
+            found[name] = (
+                array.tolist() if array.size <= MAX_LISTED_NUMBERS else f"sha256 {digest.hexdigest()}"
+            )
     return found
+
+
+def _array_of_numbers(value: Any) -> np.ndarray[Any, Any] | None:
+    """Return an array, list, tuple or scalar of NumPy as an array of numbers; None for anything else."""
+    if isinstance(value, list | tuple):
+        # Rows of unequal length are no array.
+        with suppress(ValueError, OverflowError):
+            value = np.array(value)
+    if isinstance(value, np.ndarray | np.generic) and value.dtype.kind in "biuf":
+        return np.asarray(value)
+    return None
 
 
 def copy_for_record(part: Part) -> Part:
@@ -147,8 +159,8 @@ def defect_of_next_state(start: Any, state: Any) -> str | None:
 
 
 class ControllerWatch:
-    """Detector of changes of a controller's attributes, by the controller itself, so that its state is
-    hidden, or by the caller."""
+    """Detector of changes of a controller's attributes: by its own torque, which hides its state, or by the
+    caller."""
 
     def __init__(self, controller: Controller[Any]) -> None:
         self._before = [(each, _contents(each)) for each in chain_of(controller)]
@@ -177,7 +189,8 @@ class ControllerWatch:
 
     @property
     def changed(self) -> str | None:
-        """Statement that the controller changed itself, if any attribute changed."""
+        """Statement that the controller changed itself, if any attribute changed; read it before the caller
+        can act."""
         if self.change is None:
             return None
         name, attribute = self.change

@@ -2,8 +2,8 @@
 
 A six-axis arm goes along a cycloidal motion of 2 s in PyBullet, in steps of 1 ms, under a gravity of
 9.8 m/s^2: by the engine's position and velocity motors, by feed-forward torque, and by computed torque with
-the gains 400 and 40. Other controllers are added, and dynx's own plant beside PyBullet's stepper. `plot_rows`
-draws the tracking errors.
+the gains 400 and 40. To these come the other controllers for joints that dynx has, and a second plant: dynx's
+integrator over Pinocchio. `plot_rows` draws the tracking errors.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from dynx.errors import (
     ArgumentError,
     BackendError,
     DynxError,
-    ShapeError,
     SimulationError,
     UnsupportedFeatureError,
 )
@@ -40,7 +39,7 @@ ROBOT = "ur5"
 TO = (-1.5, -1.0, 1.0, -1.57, -1.57, -1.57)
 """Final configuration [rad] of the motion of a six-axis arm, which begins at 0."""
 DURATION, DT, GRAVITY = 2.0, 1e-3, (0.0, 0.0, -9.8)
-BULLET, DYNX = PLANTS = ("pybullet", "pinocchio")
+BULLET, PINOCCHIO = PLANTS = ("pybullet", "pinocchio")
 """PyBullet's own stepper, and dynx's semi-implicit Euler over Pinocchio's forward dynamics."""
 MODES = tuple(name for name, law in BUILT_IN.items() if law.controls == "joints")
 """All modes of control; those that need least knowledge of the robot come first."""
@@ -51,7 +50,9 @@ class TutorialResult:
     """One mode on one plant: its record, and the error that prevented or ended it."""
 
     rollout: Rollout | None = None
+    """Record, as far as the simulation came; None if it did not begin."""
     problem: str | None = None
+    """Message of the error; None if there was none."""
 
     @property
     def failed(self) -> bool:
@@ -76,8 +77,11 @@ class Row:
     """One mode of control on every plant."""
 
     mode: str
+    """Name of the controller, as in `named_controller`."""
     what: str
+    """Description of the controller, in one line."""
     outcomes: Mapping[str, TutorialResult] = field(default_factory=dict)
+    """Result on each plant, by its name."""
 
 
 @dataclass(frozen=True)
@@ -86,9 +90,13 @@ class Tutorial:
 
     model: Model
     motion: Trajectory
+    """Reference of every controller."""
     dt: float = DT
+    """Step of the plants, and the control step [s]."""
     plants: tuple[str, ...] = PLANTS
-    backend: str = DYNX
+    """Backends that move the robot."""
+    backend: str = PINOCCHIO
+    """Backend with which the controllers compute."""
 
     def rows(self) -> Iterator[Row]:
         """Simulate and yield the rows one by one; the outcome of an unavailable mode has the reason."""
@@ -128,7 +136,7 @@ def tutorial(
     duration: float = DURATION,
     dt: float = DT,
     plants: tuple[str, ...] = PLANTS,
-    backend: str = DYNX,
+    backend: str = PINOCCHIO,
 ) -> Tutorial:
     """Prepare the tutorial's experiments; `model` is by default the UR5 with the tutorial's gravity.
 
@@ -151,8 +159,6 @@ def tutorial(
             )
         to = TO
     motion = cycloidal(begin, to, duration, model=robot)
-    if motion.nq != robot.nq:
-        raise ShapeError(f"`to` has {motion.nq} numbers; {robot.name} needs {robot.nq}")
     check(robot, motion, effort=False)
     backend_class(backend).require_engine()
     return Tutorial(robot, motion, dt, plants, backend)

@@ -2,14 +2,13 @@
 
 At the start these are overlaps, violated constraints, joints beyond their limits, accelerations without a
 bound, parts that are too fast for the step, and coefficients of contact that the engine does not have. Likely
-causes of divergence are gains,
-torques, forces, overlaps and light parts.
+causes of divergence are gains, torques, forces, overlaps and light parts. Names of parts are in quotes.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,7 +16,7 @@ import numpy as np
 
 from dynx.backends.singular_direction import main_joints, singular_direction
 from dynx.errors import DynxError, shown
-from dynx.model.elements import IDENTITY, Vector
+from dynx.model.elements import IDENTITY, Joint, Vector
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.model.tree import STANDARD_GRAVITY
 from dynx.spatial.scalar import Floats
@@ -132,7 +131,7 @@ def notes_on_start(engine: Stepper, state: WorldState) -> tuple[str, ...]:
         *_overlaps_at_start(engine),
         *(f"{each} at the start, {drawn}" for each in violations(engine.layout, state)),
         *notes_on_limits(joints_beyond_limits(engine.layout, state), engine.beyond_limits),
-        *notes_on_held_joints(_joints_without_range(engine.layout)),
+        *notes_on_held_joints(_held_joints(engine.layout)),
         *unbounded_motions(engine.layout, state),
         *_fast_parts(engine, state),
     )
@@ -233,23 +232,31 @@ def notes_on_held_joints(joints: Sequence[str]) -> Iterator[str]:
         yield f"limits without a range hold {listed}{more}; joint_limits=False switches them off"
 
 
-def _joints_without_range(layout: Layout) -> list[str]:
+def joints_without_range(joints: Iterable[Joint], lower: Floats, upper: Floats) -> list[str]:
+    """Return the names of the joints that their limits (n,) hold in one place; of a ball joint only `upper`
+    counts, the largest angle."""
     return [
-        f"{robot.name}/{joint.name}"
+        joint.name
+        for joint, low, high in zip(joints, lower, upper, strict=True)
+        if (0.0 if joint.type == "ball" else low) == high
+    ]
+
+
+def _held_joints(layout: Layout) -> list[str]:
+    """Return the joints of all robots that their limits hold."""
+    return [
+        f"{robot.name}/{name}"
         for robot in layout.robots
-        for joint, low, high in zip(
-            (each for each in robot.model.joints if each.moves),
-            *robot.joint_positions(robot.q)[1:],
-            strict=True,
+        for name in joints_without_range(
+            (each for each in robot.model.joints if each.moves), *robot.joint_positions(robot.q)[1:]
         )
-        if low == high
     ]
 
 
 def beyond_limits(names: Sequence[str], q: Floats, lower: Floats, upper: Floats) -> list[str]:
     """Return the beginning of a sentence for each joint, at q (n,), that is beyond a limit."""
     return [
-        f"{shown(name)} is at {x:.4g}, beyond its limits "  # a ball joint has no lower one
+        f"{shown(name)} is at {x:.4g}, beyond its limits "  # a ball joint has only an upper one
         f"{'up' if low == -np.inf else f'{low:.4g}'} to {high:.4g}, at the start"
         for name, x, low, high in zip(names, q, lower, upper, strict=True)
         if not low - LIMIT_EXCESS <= x <= high + LIMIT_EXCESS

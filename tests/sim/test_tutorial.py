@@ -18,7 +18,7 @@ from dynx.errors import (
     UnsupportedFeatureError,
 )
 from dynx.model.loading import load
-from dynx.sim.tutorial import BULLET, DYNX, LEAST, MODES, PLANTS, Row, plot_rows, tutorial
+from dynx.sim.tutorial import BULLET, LEAST, MODES, PINOCCHIO, PLANTS, Row, plot_rows, tutorial
 from tests.oracles.closed_form import MODELS
 from tests.sim.bars import EXACT_ON_BULLET, EXACT_ON_DYNX, PLANTS_AGREE, TRACKING
 
@@ -32,7 +32,7 @@ def rows() -> dict[str, Row]:
     return {row.mode: row for row in tutorial().rows()}
 
 
-def error(row: Row, plant: str = DYNX) -> float:
+def error(row: Row, plant: str = PINOCCHIO) -> float:
     """Return the largest error of a mode, which must have one."""
     largest = row.outcomes[plant].max_error
     assert largest is not None
@@ -49,8 +49,8 @@ def test_every_mode_is_there_with_what_it_is(rows: dict[str, Row]) -> None:
 def test_motors_are_pybullet_s(rows: dict[str, Row]) -> None:
     for mode in MOTORS:
         outcomes = rows[mode].outcomes
-        assert outcomes[DYNX].problem == "a motor inside PyBullet"
-        assert (outcomes[DYNX].max_error, outcomes[DYNX].failed) == (None, False)
+        assert outcomes[PINOCCHIO].problem == "a motor inside PyBullet"
+        assert (outcomes[PINOCCHIO].max_error, outcomes[PINOCCHIO].failed) == (None, False)
         assert outcomes[BULLET].problem is None
     # What the engine does inside its step is what the law outside does.
     assert error(rows["pd-motor"], BULLET) == pytest.approx(error(rows["pd"], BULLET), rel=1e-6)
@@ -61,7 +61,7 @@ def test_motors_are_pybullet_s(rows: dict[str, Row]) -> None:
 @needs_bullet
 def test_plants_agree_on_every_law(rows: dict[str, Row]) -> None:
     for mode in set(MODES) - set(MOTORS):
-        ours, bullet = (rows[mode].outcomes[plant].rollout for plant in (DYNX, BULLET))
+        ours, bullet = (rows[mode].outcomes[plant].rollout for plant in (PINOCCHIO, BULLET))
         assert ours is not None
         assert bullet is not None
         assert np.abs(ours.q - bullet.q).max() <= PLANTS_AGREE, mode
@@ -82,7 +82,7 @@ def test_the_bars_hold_on_pybullet(rows: dict[str, Row]) -> None:
 
 
 def test_errors_are_those_of_the_record(rows: dict[str, Row]) -> None:
-    outcome = rows["pd"].outcomes[DYNX]
+    outcome = rows["pd"].outcomes[PINOCCHIO]
     assert outcome.rollout is not None
     assert outcome.max_error == np.abs(outcome.rollout.error).max()
     assert outcome.rms_error == pytest.approx(np.sqrt(np.mean(outcome.rollout.error**2)))
@@ -98,7 +98,7 @@ def test_without_pybullet_the_other_plant_is_left(monkeypatch: pytest.MonkeyPatc
     for row in tutorial(duration=2.0, dt=0.02).rows():
         assert row.outcomes[BULLET].problem == "no PyBullet here"
         assert row.outcomes[BULLET].rollout is None
-        assert row.mode in MOTORS or row.outcomes[DYNX].rollout is not None
+        assert row.mode in MOTORS or row.outcomes[PINOCCHIO].rollout is not None
 
 
 def test_a_mode_that_cannot_be_simulated_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,8 +106,8 @@ def test_a_mode_that_cannot_be_simulated_says_why(monkeypatch: pytest.MonkeyPatc
         raise ArgumentError("no such motion")
 
     monkeypatch.setattr("dynx.sim.tutorial.simulate", refusing)
-    for row in tutorial(duration=2.0, dt=0.02, plants=(DYNX,)).rows():
-        outcome = row.outcomes[DYNX]
+    for row in tutorial(duration=2.0, dt=0.02, plants=(PINOCCHIO,)).rows():
+        outcome = row.outcomes[PINOCCHIO]
         assert row.mode in MOTORS or (outcome.problem, outcome.rollout) == ("no such motion", None)
 
 
@@ -116,22 +116,22 @@ def test_a_mode_that_diverges_keeps_its_record() -> None:
     # Stops would bound the motion; this robot has none.
     free = load(MODELS / "double_pendulum.urdf")
     assert not np.isfinite([free.lower, free.upper]).any()
-    made = tutorial(free, to=[0.5, -0.3], dt=0.2, duration=20.0, plants=(DYNX,))
+    made = tutorial(free, to=[0.5, -0.3], dt=0.2, duration=20.0, plants=(PINOCCHIO,))
     rows = {row.mode: row for row in made.rows()}
-    outcome = rows["computed-torque"].outcomes[DYNX]
+    outcome = rows["computed-torque"].outcomes[PINOCCHIO]
     assert outcome.failed
     assert outcome.problem is not None
     assert "diverged in step" in outcome.problem
     assert outcome.rollout is not None
     assert outcome.max_error is None
-    assert not rows["discrete-computed-torque"].outcomes[DYNX].failed
+    assert not rows["discrete-computed-torque"].outcomes[PINOCCHIO].failed
 
 
 def test_another_robot_goes_where_it_is_told() -> None:
     model = load(MODELS / "double_pendulum.urdf")
     rows = {row.mode: row for row in tutorial(model, to=[0.5, -0.3], dt=2e-3).rows()}
     assert error(rows["computed-torque"]) <= TRACKING
-    assert all(row.outcomes[DYNX].problem is None for row in rows.values() if row.mode not in MOTORS)
+    assert all(row.outcomes[PINOCCHIO].problem is None for row in rows.values() if row.mode not in MOTORS)
 
 
 def test_motions_that_cannot_be_had() -> None:

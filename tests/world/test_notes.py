@@ -11,7 +11,7 @@ import pytest
 import dynx
 from dynx import Pose
 from dynx.model import Inertial, Joint, Link, Model
-from dynx.model.elements import JointType
+from dynx.model.elements import JointType, Limits, Mimic
 from dynx.world import (
     Encoder,
     Imu,
@@ -268,3 +268,32 @@ def test_an_ellipsoid_rests_on_its_shortest_half_axis_and_bullet_says_what_it_ha
         world.run(1.0)
         # A polyhedron within 0.2 % of the half axes, and contacts that yield by less than half a millimetre.
         assert world.state.bodies["lens"].position[2] == pytest.approx(0.1, abs=0.002 * 0.1 + 5e-4)
+
+
+def test_joints_that_limits_hold_are_noted_alike_in_worlds_and_rollouts() -> None:
+    body = Inertial(1.0, Pose((0.1, 0.0, 0.0)), 0.1, 0.0, 0.0, 0.1, 0.0, 0.1)
+    links = [Link("base"), *(Link(name, body) for name in ("a", "b", "c", "d"))]
+    held, free = Limits(0.2, 0.2, 1.0, 1.0), Limits(-1.0, 1.0, 1.0, 1.0)
+    joints = [
+        Joint("held", "revolute", "base", "a", limits=held),
+        Joint("free", "revolute", "a", "b", limits=free),
+        Joint("driver", "revolute", "b", "c", limits=free),
+        Joint("follower", "revolute", "c", "d", limits=held, mimic=Mimic("driver", 1.0, 0.0)),
+    ]
+    model = Model.build("held", links, joints)
+    rollout = dynx.simulate(model, duration=0.01, plant="reference")
+    assert [note for note in rollout.notes if "without a range" in note] == [
+        "limits without a range hold 'held', 'driver'; joint_limits=False switches them off"
+    ]
+    with World(Scene("s", robots=[SceneRobot("arm", model)]), "dynx") as world:
+        (note,) = (note for note in world.notes if "without a range" in note)
+    assert note.startswith("limits without a range hold 'arm/held', ")
+
+
+def test_a_ball_joint_of_largest_angle_zero_is_held() -> None:
+    body = Inertial(1.0, Pose((0.1, 0.0, 0.0)), 0.1, 0.0, 0.0, 0.1, 0.0, 0.1)
+    joint = Joint("shoulder", "ball", "base", "a", limits=Limits(0.0, 0.0))
+    model = Model.build("ball", [Link("base"), Link("a", body)], [joint])
+    with World(Scene("s", robots=[SceneRobot("arm", model)]), "dynx") as world:
+        assert any("hold 'arm/shoulder'" in note for note in world.notes)
+    assert any("hold 'shoulder'" in note for note in dynx.simulate(model, duration=0.01).notes)

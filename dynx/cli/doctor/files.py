@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import PurePath
 
 import click
@@ -78,8 +79,19 @@ class ReportFiles(OutputFiles):
         return json_text(baseline_document(reports, os.path.dirname(self.baseline or ""))) + "\n"
 
 
-def save_counterexamples(folder: str, report: DoctorReport) -> Mapping[int, str]:
-    """Write the counterexamples of a report into a directory; return their files by number."""
+MAX_STEM = 60
+"""Largest number of characters of a robot's name in the name of a file."""
+
+
+def save_counterexamples(
+    folder: str, report: DoctorReport, taken: set[str] | None = None
+) -> Mapping[int, str]:
+    """Write the counterexamples of a report into a directory; return their files by index in
+    `report.unexplained`.
+
+    `taken` are the files that other reports of the run have written; the new ones are added to it.
+    """
+    taken = set() if taken is None else taken
     saved: dict[int, str] = {}
     written: dict[str, str] = {}
     for number, each in enumerate(report.unexplained):
@@ -88,8 +100,8 @@ def save_counterexamples(folder: str, report: DoctorReport) -> Mapping[int, str]
             continue
         if found.urdf not in written:
             stem = os.path.basename(report.robot).removesuffix(".urdf")
-            name = _file_name(f"{stem}-{report.base}-{each.engine}-{each.quantity}")
-            path = os.path.normpath(os.path.join(folder, f"{name}.counterexample.urdf"))
+            ending = _file_name(f"{report.base}-{each.engine}-{each.quantity}")
+            path = _free_path(folder, f"{_file_name(stem, MAX_STEM)}-{ending}", taken)
             refuse_links(os.path.dirname(path), [os.path.basename(path)])
             make_folder(path)
             write_text(path, _with_state(found, each))
@@ -110,8 +122,20 @@ def _with_state(found: Counterexample, each: Unexplained) -> str:
     return f"{text.rstrip()}\n<!-- {comment} -->\n".encode("ascii", "xmlcharrefreplace").decode("ascii")
 
 
-def _file_name(text: str) -> str:
-    return re.sub(r"[^A-Za-z0-9._-]+", "_", text)[:100].lstrip(".-") or "robot"
+def _free_path(folder: str, name: str, taken: set[str]) -> str:
+    """Return the path of a counterexample, numbered if it is `taken`, and add it to these."""
+    for number in count(1):
+        ending = "" if number == 1 else f"-{number}"
+        path = os.path.normpath(os.path.join(folder, f"{name}{ending}.counterexample.urdf"))
+        if os.path.normcase(path) not in taken:
+            taken.add(os.path.normcase(path))
+            return path
+    raise AssertionError
+
+
+def _file_name(text: str, size: int = 100) -> str:
+    """Return a text with characters that every file system takes, `size` of them at most."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "_", text)[:size].lstrip(".-") or "robot"
 
 
 def planned_targets(
@@ -153,17 +177,15 @@ def targets(inputs: Sequence[RobotInput], out: str, bases: Sequence[Base | None]
         if other != each.robot:
             both = f"{shown(other, 200)} and {shown(each.robot, 200)}"
             raise ArgumentError(f"{both} would both be written to {shown(path, 300)}")
-    try:
-        require_apart(paths, (each.robot for each in inputs), "the file that is read")
-    except ArgumentError as error:
-        raise ArgumentError(f"--fix: {error}; --in-place overwrites it") from None
+    read = [each.robot for each in inputs]
+    require_other_files(paths, read)
     if len(bases) == 1:
         return paths
     ends = map(os.path.splitext, paths)
     found = [f"{stem}-{base}{suffix}" for stem, suffix in ends for base in bases]
     for path in found:
         refuse_links(os.path.dirname(path), [os.path.basename(path)])
-    require_apart(found, (each.robot for each in inputs), "the file that is read")
+    require_other_files(found, read)
     return found
 
 
@@ -183,14 +205,12 @@ def in_place_targets(inputs: Sequence[RobotInput]) -> list[str]:
     return [each.robot for each in inputs]
 
 
-def require_other_file(path: str, read: str) -> None:
-    """Raise ArgumentError where `path` is the file that was read."""
+def require_other_files(paths: Sequence[str], read: Sequence[str]) -> None:
+    """Raise ArgumentError where one of the `paths` of --fix is a file that is read."""
     try:
-        same = os.path.samefile(path, read)
-    except (OSError, ValueError):  # one of them is not there
-        same = False
-    if same:
-        raise ArgumentError(f"--fix {shown(path, 300)} is the file that is read; --in-place overwrites it")
+        require_apart(paths, read, "the file that is read")
+    except ArgumentError as error:
+        raise ArgumentError(f"--fix: {error}; --in-place overwrites it") from None
 
 
 def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
@@ -208,7 +228,7 @@ def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
     if text is None or report.error is not None:
         return False
     if not over_input and report.source is not None:
-        require_other_file(path, report.source)
+        require_other_files([path], [report.source])
     if over_input:
         _require_unchanged(path, report)
     make_folder(path)

@@ -142,6 +142,7 @@ class Conclusion:
         self._engines = engines
         self._problems: list[str] = []
         self._replaced: list[str] = []
+        self._counterexamples: set[str] = set()
 
     def reach(self, *, quiet: bool) -> int:
         """Write and show everything; return the exit code."""
@@ -189,7 +190,7 @@ class Conclusion:
 
     def _save_counterexamples(self, report: DoctorReport) -> Mapping[int, str]:
         try:
-            return save_counterexamples(self._folder, report)
+            return save_counterexamples(self._folder, report, self._counterexamples)
         except DynxError as error:
             self._problems.append(str(error))
             return {}

@@ -2,7 +2,7 @@
 
 Importing pydrake.multibody takes about half a second, most of it for geometry and systems that
 `MultibodyPlant` needs. pydrake sends Drake's log to Python's logger ``drake`` and adds no handler, so
-messages about a file are captured with `captured_log` and shown nowhere else.
+warnings and infos about a file are captured with `captured_log` and shown nowhere else.
 
 The classes are of type Any, because the stubs of some versions of pydrake reject NumPy arrays that the
 functions accept.
@@ -95,7 +95,7 @@ def drake_version() -> str:
 
 
 def error_message(error: BaseException) -> str:
-    """Return Drake's message on one line of at most 400 characters, after the type of the exception."""
+    """Return Drake's message on one line: the type of the exception, then at most 400 characters."""
     words = " ".join(str(error).split())
     return f"{type(error).__name__}: {escaped(words, 400) if words else 'no message'}"
 

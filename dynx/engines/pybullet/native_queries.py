@@ -88,7 +88,8 @@ def _add(engine: ModuleType, client: int, drawn: DrawnShape, file: Path) -> None
 
 
 def _visual(engine: ModuleType, drawn: DrawnShape, file: Path) -> dict[str, Any]:
-    """Return the arguments of a visual shape; that of a mesh is written to a file with a suffix."""
+    """Return the arguments of a visual shape; shapes that Bullet lacks are written as meshes, beside
+    `file`."""
     shape = drawn.shape
     if isinstance(shape, Box):
         return {"shapeType": engine.GEOM_BOX, "halfExtents": [0.5 * edge for edge in shape.size]}
@@ -132,6 +133,7 @@ def _write_obj(mesh: Mesh, file: Path) -> str:
 
 
 def _picture(engine: ModuleType, client: int, T_world_camera: Floats, camera: Camera) -> Drawing:
+    """Draw the scene of a client by TinyRenderer; the bodies are the numbers of its shapes."""
     width, height = camera.size
     near, far, scale = camera.near, camera.far, 2.0 * camera.focal_length
     # OpenGL's camera looks along -z, with y upwards; its matrices are stored by columns.

@@ -12,14 +12,14 @@ from dynx.same.attributes import Kind
 from dynx.same.report import SameReport
 
 RULES: dict[str, str] = {
-    "joint-type": "The type of a joint differs.",
+    "joint-type": "The type of a joint differs from that of its counterpart.",
     "joint-origin": "The place of a joint differs.",
     "joint-axis": "The axis of a joint differs.",
     "joint-mimic": "What a mimic joint follows differs.",
     "link-inertial": "Mass, centre of mass or inertia of a body differ in a way that some state shows.",
     "joint-missing": "A joint of the first description has no counterpart in the second.",
     "joint-extra": "A joint of the second description has no counterpart in the first.",
-    "joint-moved": "A joint has another type or another parent in the second description.",
+    "joint-moved": "The joint of that name has another type or parent, so that it is no counterpart.",
     "base": "One base is fixed, the other floating.",
 } | {
     kind.replace(" ", "-"): f"The {kind} of a joint or link differs, which does not change the verdict."
@@ -33,7 +33,8 @@ class SameFinding:
     """A difference of two descriptions at an element of each; `level` is ``note`` if the verdict does not
     depend on it.
 
-    `size` is relative to the scale of what differs, infinite for a joint without counterpart.
+    `size` is relative to the scale of what differs; infinite where nothing is compared by size: for a joint
+    without counterpart, a base, and a note.
     """
 
     rule: str
@@ -98,5 +99,5 @@ def findings(report: SameReport) -> Iterator[SameFinding]:
 
 
 def base_of(report: SameReport) -> str:
-    """Return the base with which both descriptions are compared."""
+    """Return the base of the first description, and of the second unless there is a finding `base`."""
     return "fixed" if report.T_first_second is None else "floating"

@@ -70,14 +70,15 @@ def excerpt(text: str | None, line: int | None) -> list[tuple[int, str]]:
 
 
 def changes(report: SameReport, text: str | None) -> TextChanges | None:
-    """Compare the second file with the mended one; None where nothing was mended."""
+    """Compare the `text` of the second file with the mended one; None where nothing was mended or `text` is
+    None."""
     if text is None or report.mended_text is None:
         return None
     return text_changes(text, report.mended_text.decode("utf-8", "replace"))
 
 
 def description_text(robot: str) -> str | None:
-    """Return the text of a description whose lines its elements have; None where it includes other files."""
+    """Return the text to which the line numbers of the elements refer; None where it includes other files."""
     data, source, _ = read_description(robot)
     found = XmlSource(data, source)
     if any(each.tag in ("include", "attach") for each in found.root.walk()):

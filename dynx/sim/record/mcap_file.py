@@ -82,7 +82,8 @@ def read_messages(path: str) -> tuple[list[tuple[str, int, bytes]], dict[str, di
     """Return topic, time stamp [ns] and data of the messages of a recording, in their order, and its metadata
     by name.
 
-    Raises ArgumentError for a file that cannot be read as MCAP, NotInstalledError without mcap.
+    Raises ArgumentError, which names the file, for one that cannot be read as MCAP; NotInstalledError
+    without mcap.
     """
     with importing("a .mcap file needs mcap: pip install 'dynx[mcap]'"):
         from mcap.records import Channel, Message, Metadata
@@ -100,6 +101,8 @@ def read_messages(path: str) -> tuple[list[tuple[str, int, bytes]], dict[str, di
                     messages.append((topics[record.channel_id], record.log_time, record.data))
                     if len(messages) > MAX_MESSAGES:
                         raise ValueError(f"it has more than {MAX_MESSAGES:,} messages")
+    except OSError as error:
+        raise ArgumentError(f"{printable(path)} cannot be read: {error.strerror or error}") from error
     # A damaged file raises what its records lead to: struct.error, KeyError, errors of zstandard.
     except Exception as error:
         reason = str(error) or type(error).__name__
@@ -176,14 +179,14 @@ def load_mcap(path: str | os.PathLike[str]) -> dict[str, Any]:
     NotInstalledError without mcap.
     """
     name = checked_path(path)
+    found, about = read_messages(name)
+    settings = about.get("dynx.rollout", {})
+    if settings.get("schema") != SCHEMA:
+        raise ArgumentError(f"{shown(name, 300)} is no recording of dynx, which writes {SCHEMA}")
+    messages: Messages = defaultdict(list)
+    for topic, stamp, data in found:
+        messages[topic].append((stamp, data))
     try:
-        found, about = read_messages(name)
-        settings = about.get("dynx.rollout", {})
-        if settings.get("schema") != SCHEMA:
-            raise ArgumentError(f"{shown(name, 300)} is no recording of dynx, which writes {SCHEMA}")
-        messages: Messages = defaultdict(list)
-        for topic, stamp, data in found:
-            messages[topic].append((stamp, data))
         return _fields(messages, settings)
     except DynxError as error:
         raise ArgumentError(f"{shown(name, 300)} cannot be read as a rollout: {error}") from error

@@ -1,7 +1,5 @@
 """Plot of a rollout on one page: positions, errors, and torques.
 
-Without a reference, velocities are shown instead of errors.
-
 Robots with many joints get several columns, so that the curves in each panel can be distinguished.
 """
 
@@ -79,7 +77,7 @@ def _contact_forces(rollout: Rollout) -> dict[str, Floats]:
     if rollout.surroundings is None:
         return {}
     contacts = rollout.surroundings.contacts
-    # The ground's force is the sum of the others.
+    # Leave out the ground: its force is the sum of the others.
     moving = {name for name in contacts.touching if "/" in name or name in rollout.surroundings.bodies}
     found = {
         name: np.linalg.norm(contacts.force_on(name), axis=1) for name in contacts.touching if name in moving

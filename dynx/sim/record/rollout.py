@@ -57,7 +57,8 @@ class Summary(NamedTuple):
     max_speed: Floats
     max_torque: Floats
     energy_drift: float
-    """Largest change of the energy since the start, divided by the largest kinetic energy."""
+    """Largest change of the energy since the start, divided by the largest kinetic energy; that change [J]
+    if nothing ever moved."""
     saturated: float
     """Share of the steps in which some motor was at its limit."""
     coordinates: tuple[str, ...] = ()
@@ -146,7 +147,7 @@ class Rollout:
     """The setpoint at each time: (n + 1, nq), (n + 1, nv), (n + 1, nv)."""
     rotors: Floats
     """Armature (nv, nv), zero unless the scenario has some."""
-    scenario: Scenario | RecordedScenario | None = RecordedScenario()  # noqa: RUF009  # a descriptor
+    scenario: Scenario | RecordedScenario | None = RecordedScenario()  # noqa: RUF009  # gives None by default
     """The simulation whose record this is; None for a record made in another way."""
     executor: str = ""
     """Executor of the steps: ``compiled`` (one kernel), ``compiled pieces`` (between the calls of an
@@ -370,13 +371,16 @@ class Rollout:
         model, q, scenario = self.model, self.q[0], self.scenario
         own = [*position_notes(model, q, "q0"), *gravity_notes(model.gravity)]
         if scenario is not None and scenario.joint_limits and not isinstance(scenario.plant, ScenePlant):
-            from dynx.world.notes import beyond_limits, notes_on_held_joints, notes_on_limits
+            from dynx.world.notes import (
+                beyond_limits,
+                joints_without_range,
+                notes_on_held_joints,
+                notes_on_limits,
+            )
 
-            at = limited_positions(model, q)
-            beyond = beyond_limits(model.joint_names, at, *joint_ranges(model))
-            own += notes_on_limits(beyond, MOVES_NO_FURTHER)
-            limits = [(each.name, each.limits) for each in model.coordinate_joints]
-            own += notes_on_held_joints([name for name, each in limits if each.lower == each.upper])
+            at, ranges = limited_positions(model, q), joint_ranges(model)
+            own += notes_on_limits(beyond_limits(model.joint_names, at, *ranges), MOVES_NO_FURTHER)
+            own += notes_on_held_joints(joints_without_range(model.coordinate_joints, *ranges))
         if scenario is not None and scenario.joint_springs and not isinstance(scenario.plant, ScenePlant):
             steps = whole_number("substeps", scenario.substeps, 1)
             acting = disturbances_of(replace(scenario, pushes=()), model)
@@ -445,7 +449,7 @@ def _numbers(controller: Controller[Any] | Unknown | None) -> dict[str, Any]:
 def _first_step(departure: str) -> int:
     """Return the first step that does not follow from the scenario by a departure.
 
-    After another controller or reference the scenario is that of the later steps, so it is the first of all.
+    Another controller or reference replaces the scenario, so no earlier step follows from it: 0.
     """
     how, named, step = departure.rpartition(" from step ")
     return int(step) if named and step.isdecimal() and not how.startswith("another ") else 0

@@ -187,6 +187,27 @@ def test_a_counterexample_stays_in_its_folder(name: str) -> None:
         assert [Path(file).parent for file in saved.values()] == [Path(folder)]
 
 
+def test_counterexamples_of_one_run_have_files_of_their_own(tmp_path: Path) -> None:
+    report = differing("long" * 60)
+    [(index, each)] = [(k, x) for k, x in enumerate(report.unexplained) if x.counterexample is not None]
+    assert each.counterexample is not None
+    other = replace(each, engine="drake", counterexample=replace(each.counterexample, urdf=SMALL + "\n"))
+    both = replace(report, unexplained=(*report.unexplained, other))
+    saved = save_counterexamples(str(tmp_path), both)
+    assert set(saved) == {index, len(report.unexplained)}
+    for path, engine in zip(saved.values(), (each.engine, "drake"), strict=True):
+        assert Path(path).name.endswith(f"-fixed-{engine}-{each.quantity}.counterexample.urdf")
+    # Robots of one name in several folders, too.
+    taken: set[str] = set()
+    files = [
+        file
+        for robot in ("a/arm.urdf", "b/arm.urdf")
+        for file in save_counterexamples(str(tmp_path), differing(robot), taken).values()
+    ]
+    assert len({*files}) == 2
+    assert all(Path(file).exists() for file in files)
+
+
 def shown(report: DoctorReport, width: int = 80) -> str:
     """Return the report of one robot on a terminal of that width."""
     out = StringIO()

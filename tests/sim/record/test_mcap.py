@@ -391,3 +391,28 @@ def test_other_recordings_are_refused(tmp_path: Path) -> None:
             Rollout.load(path)
     with pytest.raises(ArgumentError):
         Rollout.load(tmp_path / "nothing.mcap")
+
+
+def test_a_recording_is_not_loaded_without_mcap(
+    arm: Rollout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mcap")
+    path = tmp_path / "run.mcap"
+    arm.save(path)
+    monkeypatch.setitem(sys.modules, "mcap.records", None)
+    with pytest.raises(NotInstalledError, match=r"pip install '\S*\[mcap\]'"):
+        Rollout.load(path)
+
+
+@pytest.mark.parametrize("content", [None, b"no recording"])
+def test_a_file_that_is_no_recording_is_named_once(tmp_path: Path, content: bytes | None) -> None:
+    pytest.importorskip("mcap")
+    path = tmp_path / "run.mcap"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ArgumentError) as caught:
+        Rollout.load(path)
+    message = str(caught.value)
+    assert message.count("run.mcap") == 1
+    assert ("No such file" in message) == (content is None)
+    assert "Errno" not in message
