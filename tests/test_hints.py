@@ -223,6 +223,17 @@ def test_a_scene_of_another_format_is_said_to_be_one(name: str) -> None:
         dynx.world.read_scene(name)
 
 
+@pytest.mark.parametrize("name", ["robots/arm.urdf", "robots/arm.xacro", "pendulum"])
+def test_the_error_for_a_robot_in_place_of_a_scene_has_a_scene_with_it(name: str, tmp_path: Path) -> None:
+    with pytest.raises(DynxError) as raised:
+        dynx.world.read_scene(name)
+    text = str(raised.value).partition("on the ground is ")[2].replace("arm.xacro", "arm.urdf")
+    (tmp_path / "arm.urdf").write_text('<robot name="arm"><link name="base"/></robot>')
+    (tmp_path / "scene.json").write_text(text[: text.rindex("}") + 1])
+    scene = dynx.world.read_scene(tmp_path / "scene.json")
+    assert [scene.bodies[0].name, scene.robots[0].name] == ["ground", "robot"]
+
+
 def test_one_pose_of_a_sensor_at_rest_is_one_of_many() -> None:
     T = dynx.Pose((0.0, 0.0, 1.0), (0.1, 0.2, 0.3)).matrix
     one, many = (dynx.control.SensorMotion.at_rest(each) for each in (T, T[None]))

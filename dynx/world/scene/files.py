@@ -133,17 +133,25 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     write_bytes(file, tomli_w.dumps(document, multiline_strings=True).encode())
 
 
+_ROBOT_FILES = (".urdf", ".xacro", ".sdf")
+
+
 def _named(name: str) -> Path:
     for root in own_roots():
         path = root / SCENES / f"{name}.toml"
         if name in scene_names() and path.is_file():
             return path
     known = scene_names()
-    robot = name in _robot_names() or name.endswith((".urdf", ".xacro"))
-    hint = ", and names its robots" if robot else ""
+    is_file = name.lower().endswith(_ROBOT_FILES)
+    hint = ""
+    if is_file or name in _robot_names():
+        bodies = [{"name": "ground", "shape": {"plane": True}}]
+        robot = {"name": "robot", "robot": os.path.basename(name) if is_file else name}
+        text = json.dumps({"schema": "dynx.scene/1", "bodies": bodies, "robots": [robot]})
+        hint = f"; a .json file{' beside it' if is_file else ''} with this robot on the ground is {text}"
     raise RobotNotFoundError(
-        f"no scene {shown(name)} (a file of a scene ends in .toml, .json or, in MJCF, .xml{hint})"
-        f"{format_hint(name)}"
+        f"no scene {shown(name)} (a file of a scene ends in .toml, .json or, in MJCF, .xml)"
+        f"{format_hint(name)}{hint}"
         f"{nearest(name, known)}"
     )
 
