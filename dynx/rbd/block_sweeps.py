@@ -65,6 +65,11 @@ INNER = 2
 visit reduce the residual as much as two visits, because the rows of a point are coupled more than two
 points."""
 
+MOST_OF_SLOPE = 1.5
+"""Largest step of a normal in a projection, as a multiple of the one after which a contact that slides does
+not move along its normal. The normal velocity changes by a + mu b . d with a normal impulse of 1 and the
+friction mu d, and steps of 2 / (a + mu |b|) would repeat the same two impulses for ever."""
+
 LEAST_IMPULSE = 1e-20
 """Largest friction [N s] of a contact before a visit that counts as none."""
 
@@ -337,6 +342,8 @@ def _projected_impulses(block: Block, mu: Any, x: Vector, w: Vector) -> Vector:
     and its tangents, from impulses x (3,) and the velocities w (3,) with them."""
     (a, b, c), (_, d, e), (_, _, f) = block.G
     of_normal, of_tangents = block.inverse
+    # This does not depend on impulses, so that kernels compute it once for all sweeps.
+    of_normal = of_normal * minimum(1.0, MOST_OF_SLOPE / (1.0 + mu * norm([b, c]) * of_normal))
     n, s, t = x
     wn, ws, wt = w
     for number in range(INNER):

@@ -64,6 +64,11 @@ MAX_ACCELERATION = 64.0
 """Number of steps of sweeps that acceleration takes at most at once. Along impulses that change no velocity,
 as redundant contacts have, steps are rounding and their quotients arbitrary."""
 
+ACCELERATED = 60
+"""Number of sweeps with acceleration, after which as many follow without, and so on. In some states
+accelerated sweeps lead around the solution for ever, and the plain ones go there; in others the plain ones
+are slow."""
+
 MAX_GROWTH = 2.0
 """Factor by which the squared length of a step may exceed that of the step before. Where joints with dry
 friction stick beside contacts, impulses grow by equal steps until one of them slips, and acceleration takes
@@ -200,7 +205,7 @@ class Sweeps:
         Changes by accelerated sweeps may be smaller than the residual, and impulses of redundant points may
         have far to go with small ones.
         """
-        return cls(tolerance=4e-7, most=240, accelerated=True) if redundant else cls()
+        return cls(tolerance=4e-7, most=480, accelerated=True) if redundant else cls()
 
 
 def repeat_numbers(step: Callable[[Numbers], Numbers], state: Numbers, most: int) -> Numbers:
@@ -419,7 +424,10 @@ def _solved_impulses(
             share = _product(weights, turned, step) / (_product(weights, turned, turned) + TINY)
             share = minimum(maximum(share, -MAX_ACCELERATION), MAX_ACCELERATION)
             share = select(less(MAX_GROWTH * state["size"][0], size), 0.0, share)
-            found |= {"step": step, "size": [size]}
+            count = state["count"][0]
+            share = select(less(count, float(ACCELERATED)), share, 0.0)
+            count = select(less(count, 2.0 * ACCELERATED - 1.0), count + 1.0, 0.0)
+            found |= {"step": step, "size": [size], "count": [count]}
             found["point"] = [a - share * (a - b) for a, b in zip(x, state["impulses"], strict=True)]
             found["of_point"] = [a - share * (a - b) for a, b in zip(shared, state["shared"], strict=True)]
         else:
@@ -432,7 +440,7 @@ def _solved_impulses(
     x, shared = list(impulses), [start[k] for k in places]
     first = {"impulses": x, "shared": shared, "goes_on": [1.0]}
     if accelerated:
-        first |= {"point": x, "of_point": shared, "step": [0.0] * len(x), "size": [0.0]}
+        first |= {"point": x, "of_point": shared, "step": [0.0] * len(x), "size": [0.0], "count": [0.0]}
     else:
         first["change"] = [sweeps.tolerance / RATIO]
     state = repeat(next_state, {name: as_objects(values) for name, values in first.items()}, sweeps.most)

@@ -117,3 +117,14 @@ def test_redundant_points_of_a_body_obey_the_laws(mu: float, vx: float, vy: floa
     parts = blocks(J, redundant=True)
     residual = swept(parts, c, mu, 300)[2]
     assert residual <= 1e-6 or swept(parts, c, mu, 1200)[2] <= residual / 4.0
+
+
+def test_a_redundant_point_that_friction_lifts_obeys_the_laws() -> None:
+    """Its normal velocity grows by 0.5 with its normal impulse, and by 0.7 more with the friction of that
+    impulse; full steps of the normal would lead from 0 to 0.4 and back for ever."""
+    G = np.array([[0.5, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 3.0]])
+    parts = blocks(np.linalg.cholesky(G), redundant=True)
+    x, _, residual = swept(parts, np.array([-0.2, -2.0, 0.0]), 0.7, 60)
+    assert residual <= 1e3 * TOLERANCE
+    normal = 0.2 / (0.5 + 0.7 * 1.0)
+    np.testing.assert_allclose(x, [normal, 0.7 * normal, 0.0], atol=1e3 * TOLERANCE)
