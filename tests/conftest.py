@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 import tempfile
+from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Generator
 from typing import Any
@@ -54,9 +56,11 @@ LONGEST = (
     "tests/surveys/test_raw_engines.py",
     "tests/test_benchmarks_run.py",
     "tests/testing/test_scenes.py::test_every_sort_occurs",
-    "tests/viewer/",
 )
-"""Beginnings of the names of tests that take up to a minute each, or wait for a browser."""
+"""Beginnings of the names of tests that take up to a minute each."""
+
+WAITING = "tests/viewer/"
+"""Beginning of the names of tests most of which wait for a browser, which has processes of its own."""
 
 
 CASES, LONG_CASES = 4, 2
@@ -66,6 +70,37 @@ each takes a good part of a second or more, and repeats the others on another ro
 
 LARGEST_CHUNK = 2
 """Largest number of tests that a parallel worker is given at a time."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """A process more than processors, for ``-n auto``: that of the tests that wait computes little."""
+    # A container may have fewer than the machine.
+    processors = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    return processors + 1
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Let one process run the tests that wait, from the start, while the others compute; of several that wait
+    at the same time, each would leave a processor without work, or the browsers would hold up each other."""
+    if config.getoption("dist") != "load":
+        return None
+    from xdist.scheduler import LoadScheduling
+
+    class WaitingApart(LoadScheduling):  # type: ignore[misc, unused-ignore]
+        def _send_tests(self, node: Any, num: int) -> None:
+            # Tests that wait are the first of all, and other processes get them when no others are left.
+            first = bisect_left(
+                self.pending, True, key=lambda test: not self.collection[test].startswith(WAITING)
+            )
+            if node is not self.nodes[0] and first < len(self.pending):
+                chosen = self.pending[first : first + num]
+                del self.pending[first : first + num]
+                self.pending[:0] = chosen
+            super()._send_tests(node, num)
+
+    return WaitingApart(config, log)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -106,7 +141,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Keep the sample of ``--one-in``, and a few cases of each test if neither ``--whole`` nor a file is
-    given; put the longest tests first, so that parallel workers end together."""
+    given; put those that wait first (`pytest_xdist_make_scheduler`) and then the longest, so that parallel
+    workers end together."""
     one_in = config.getoption("--one-in")
     sample = list(items)
     if one_in > 1:
@@ -116,7 +152,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if len(sample) < len(items):
         config.hook.pytest_deselected(items=list(set(items) - set(sample)))
         items[:] = sample
-    items.sort(key=is_quick)
+    items.sort(key=place_in_order)
 
 
 def few_cases(items: list[pytest.Item]) -> list[pytest.Item]:
@@ -170,4 +206,12 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
 
 
 def is_quick(item: pytest.Item) -> bool:
-    return not item.nodeid.startswith(LONGEST)
+    return not item.nodeid.startswith((*LONGEST, WAITING))
+
+
+def place_in_order(item: pytest.Item) -> int:
+    """Return a number by which tests are sorted: those that wait and need a browser, others beside them, the
+    longest, and the quick ones."""
+    if item.nodeid.startswith(WAITING):
+        return 0 if "browser" in getattr(item, "fixturenames", ()) else 1
+    return 3 if is_quick(item) else 2
