@@ -22,7 +22,7 @@ from dynx.files.lines import line_opcodes, lines_of
 from dynx.files.temporary import temporary_folder
 from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.model import Model
-from dynx.model.document_format import Format, format_of_root
+from dynx.model.document_format import SUFFIXES, Format, format_of_root
 from dynx.model.elements import Vector
 from dynx.model.geometry.formats.facets import STL_FACET
 from dynx.model.loading import read_model
@@ -176,8 +176,6 @@ def _named_meshes(shape: SourceElement) -> list[SourceElement]:
     return [each for each in shape.walk() if each.tag == "mesh" and each.attributes.get("filename")]
 
 
-_SUFFIXES: Mapping[Format, str] = {"urdf": ".urdf", "mjcf": ".xml", "sdf": ".sdf"}
-
 _FOLDERS_ABOVE = 4
 """Largest number of folders above a document in MJCF or SDF in which it may name files, as in
 ``../meshes/arm.stl``."""
@@ -206,7 +204,7 @@ def temporary_document(
                 folder = _linked_folder(folder, Path(source.source), _folders_above(source.text))
         else:
             folder = folders.of(source)
-        path = _unused_path(folder, _SUFFIXES[form], Path(source.source).name)
+        path = _unused_path(folder, SUFFIXES[form][0], Path(source.source).name)
         path.unlink(missing_ok=True)
         written = with_mesh_boxes(source, folder) if mesh_boxes else source
         path.write_bytes(written.to_bytes())

@@ -11,8 +11,8 @@ import numpy as np
 
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import BLUE, RGB, SKY_BLUE, css
-from dynx.viewer.motion_view import SPEEDS, speed_factor
 from dynx.viewer.page import Page
+from dynx.viewer.play_control import SPEEDS, PlayControl, speed_factor
 
 _ROW = "display: flex; gap: 0.5em; align-items: center; overflow-wrap: anywhere"
 _NUMBER = "flex: 1; text-align: right; font-variant-numeric: tabular-nums"
@@ -43,7 +43,7 @@ class Standing(NamedTuple):
     """Why the episode ended; empty while it goes on."""
 
 
-class EpisodePanel:
+class EpisodePanel(PlayControl):
     """Play, pause, one step, speed, seed and next episode, and the numbers of one episode or two side by
     side.
 
@@ -55,38 +55,37 @@ class EpisodePanel:
         self._page, self._names = page, tuple(names)
         self.changed = threading.Event()
         """Set when a control was used."""
-        self._playing, self._steps, self._seed = True, 0, seed
+        super().__init__()
+        self._running.set()
+        self._steps, self._seed = 0, seed
         self._wanted: int | None = None
         gui = page.gui
         with gui.add_folder("episode"):
             self._numbers = gui.add_html("")
-            self._button = gui.add_button("pause")
+            self.add_play_button(page)
             once = gui.add_button("one step")
             self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
             self._chosen = gui.add_number("seed", seed, min=0, step=1)
             again = gui.add_button("begin with this seed")
             following = gui.add_button("next episode")
-        self._button.on_click(lambda _: self.play_or_pause())
         once.on_click(lambda _: self._request_step())
         again.on_click(lambda _: self._request(int(self._chosen.value)))
         following.on_click(lambda _: self._request(self._seed + 1))
-        page.on_own_key("P", "play or pause", self.play_or_pause)
         page.on_own_key("N", "next episode", lambda: self._request(self._seed + 1))
-
-    @property
-    def playing(self) -> bool:
-        """True while steps follow each other."""
-        return self._playing
 
     @property
     def speed(self) -> float:
         """Wanted speed, relative to the clock."""
         return speed_factor(self._speed.value)
 
-    def play_or_pause(self) -> None:
-        """Pause what plays, and play what does not."""
-        self._playing = not self._playing
-        self._button.label = "pause" if self._playing else "play"
+    def play(self) -> None:
+        """Take one step after the other."""
+        super().play()
+        self.changed.set()
+
+    def pause(self) -> None:
+        """Take steps only when they are asked for."""
+        super().pause()
         self.changed.set()
 
     def take_step(self) -> bool:
@@ -111,8 +110,8 @@ class EpisodePanel:
         self._numbers.content = numbers_html(self._names, self._seed, standings)
 
     def _request_step(self) -> None:
-        if self._playing:
-            self.play_or_pause()
+        if self.playing:
+            self.pause()
         self._steps += 1
         self.changed.set()
 

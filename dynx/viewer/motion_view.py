@@ -30,6 +30,7 @@ from dynx.viewer.library import uplot
 from dynx.viewer.marks import NamedParts, SceneMarks
 from dynx.viewer.motion import PARTED, MotionFrames, motion_separation
 from dynx.viewer.page import Page
+from dynx.viewer.play_control import SPEEDS, PlayControl, speed_factor
 
 UPDATES_PER_SECOND = 40.0
 """Rate at which the page is moved while a motion plays; 30 arrive where the machine is busy."""
@@ -37,11 +38,8 @@ UPDATES_PER_SECOND = 40.0
 SLIDER_UPDATES_PER_SECOND = 10.0
 """Largest rate at which the slider moves while a motion plays: the page lays out its panel anew each time."""
 
-SPEEDS = ("1/10", "1/4", "1/2", "1", "2", "4")
-"""Choices of the speed, relative to the clock."""
 
-
-class Timeline:
+class Timeline(PlayControl):
     """The controls of the time, and the thread that plays."""
 
     def __init__(
@@ -51,21 +49,19 @@ class Timeline:
         self._page, self._end, self._step, self._show = page, max(end, 1e-9), step, show
         self._ended = page.ended
         self._time = 0.0
-        self._running = threading.Event()
+        super().__init__()
         gui = page.gui
         with gui.add_folder("time"):
             self._slider = gui.add_slider(
                 "time [s]", 0.0, self._end, step=slider_step(0.0, self._end), initial_value=0.0
             )
-            self._button = gui.add_button("play")
+            self.add_play_button(page)
             back, forward = gui.add_button("step back"), gui.add_button("step forward")
             self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
             self._loop = gui.add_checkbox("loop", initial_value=False)
         self._slider.on_update(self._scrubbed)
-        self._button.on_click(lambda _: self.play_or_pause())
         back.on_click(lambda _: self._move(-self._step))
         forward.on_click(lambda _: self._move(self._step))
-        page.on_own_key("P", "play or pause", self.play_or_pause)
         page.at_end(self._running.set)
         self._thread = threading.Thread(target=self._play, name="dynx timeline", daemon=True)
         self.go_to(0.0)
@@ -78,30 +74,16 @@ class Timeline:
         """The time that is shown [s]."""
         return self._time
 
-    @property
-    def playing(self) -> bool:
-        """True while the motion plays."""
-        return self._running.is_set()
-
     def play(self) -> None:
         """Play on; from the start if the motion is at its end."""
         if self._time >= self._end:
             self.go_to(0.0)
-        self._button.label = "pause"
-        self._running.set()
-
-    def play_or_pause(self) -> None:
-        """Pause what plays, and play what does not."""
-        if self.playing:
-            self.pause()
-        else:
-            self.play()
+        super().play()
 
     def pause(self) -> None:
         """Stop playing."""
-        self._running.clear()
+        super().pause()
         self._slider.value = self._time
-        self._button.label = "play"
 
     def go_to(self, time: float) -> None:
         """Show the motion at a time [s], moved into its range."""
@@ -153,12 +135,6 @@ class Timeline:
                     return
                 if self._time != wanted:  # Scrubbed meanwhile: go on from there.
                     break
-
-
-def speed_factor(speed: str) -> float:
-    """Return one of the `SPEEDS` as a number."""
-    above, _, below = speed.partition("/")
-    return float(above) / float(below or 1.0)
 
 
 MAX_POINTS = 400

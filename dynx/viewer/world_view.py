@@ -22,6 +22,7 @@ from dynx.viewer.framing import SHARE, box_around, has_ground, points_around
 from dynx.viewer.marks import NamedParts, SceneMarks
 from dynx.viewer.motion import MotionFrames, fixed_bodies, motion_of_state
 from dynx.viewer.page import Page
+from dynx.viewer.play_control import PlayControl
 from dynx.world import ExternalForce, World
 from dynx.world.camera import part_poses
 
@@ -145,7 +146,7 @@ _LOADS = ("forces", "motors", "torques")
 LoadsOf = Callable[[World], Mapping[str, Any]]
 
 
-class WorldView:
+class WorldView(PlayControl):
     """A world and its controls.
 
     The page steps the world in a thread of its own, in real time where the machine can. A program that steps
@@ -185,7 +186,7 @@ class WorldView:
         )
         self._spring = Spring(page.scene, 0.3 * self._size)
         self._pushes: list[ExternalForce] = []
-        self._running = threading.Event()
+        super().__init__()
         page.lay_ground(self._size, None if has_ground(scene.bodies) else 0.0)
         self._add_controls(moving, steps=steps, collisions_first=collisions)
         self.drawn.show(visuals=not collisions, collisions=collisions)
@@ -263,28 +264,6 @@ class WorldView:
     def go_to(self, time: float) -> None:
         """Show the present state."""
         self.draw()
-
-    @property
-    def playing(self) -> bool:
-        """True while the page steps the world."""
-        return self._running.is_set()
-
-    def play(self) -> None:
-        """Let the page step the world."""
-        self._button.label = "pause"
-        self._running.set()
-
-    def play_or_pause(self) -> None:
-        """Pause what plays, and play what does not."""
-        if self.playing:
-            self.pause()
-        else:
-            self.play()
-
-    def pause(self) -> None:
-        """Stop stepping."""
-        self._running.clear()
-        self._button.label = "play"
 
     def draw(self) -> None:
         """Show the present state of the world."""
@@ -370,7 +349,7 @@ class WorldView:
             gui.add_text("engine", f"{self.world.engine} {version}", disabled=True)
             self._clock = gui.add_text("time", "", disabled=True)
             self._rate = gui.add_text("speed reached", "", disabled=True, visible=steps)
-            self._button = gui.add_button("play", visible=steps)
+            self.add_play_button(self._page, visible=steps)
             once = gui.add_button("one step", visible=steps)
             reset = gui.add_button("reset", visible=steps)
             self._factor = gui.add_slider("speed", 0.05, 2.0, step=0.05, initial_value=1.0, visible=steps)
@@ -387,11 +366,8 @@ class WorldView:
             self._pull = gui.add_checkbox("pull by a spring", initial_value=False)
             impulse = gui.add_vector3("push [N s]", initial_value=(1.0, 0.0, 0.0), step=0.1)
             push = gui.add_button("push")
-        self._button.on_click(lambda _: self.play_or_pause())
         once.on_click(lambda _: self._step_once())
         reset.on_click(lambda _: self.reset())
-        if steps:
-            self._page.on_own_key("P", "play or pause", self.play_or_pause)
 
         def show(_: Any) -> None:
             with self._page.lock:
