@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from dynx.distance.box_separation import box_separation
 from dynx.distance.contact_reduction import TIE, ContactCandidate, divided, largest, reduced
 from dynx.distance.cores import BoxCore, Core, CylinderCore, EllipsoidCore, HullCore, PointCore, SegmentCore
 from dynx.distance.distance import distance_of_cores
@@ -13,7 +12,7 @@ from dynx.distance.field_contacts import field_candidates
 from dynx.distance.overlap_polygon import NEAREST, PARALLEL_SINE, overlap
 from dynx.distance.placed_solids import PlacedSolid, placed_cores
 from dynx.distance.plane_contacts import fine_rim, plane_candidates
-from dynx.distance.separating_axes import best_axis, tangent_radius
+from dynx.distance.separating_axes import best_axis, box_separation, tangent_radius
 from dynx.distance.support_features import ContactFrame, SupportFeature, frame_along, support_feature
 from dynx.errors import ArgumentError, DTypeError, shown
 from dynx.spatial.plain import Vector3, cross, dot, minus
