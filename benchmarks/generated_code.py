@@ -2,39 +2,81 @@
 
 Pinocchio evaluates a quantity on the scalars of CppADCodeGen, which writes it as C; gcc compiles it with
 ``-Ofast -march=native``, and a loop in C calls it for every sample. It is the fastest form in which users of
-Pinocchio evaluate one robot. It computes the upper triangle of a mass matrix, dynx the whole.
+Pinocchio evaluate one robot. It computes the upper triangle of a symmetric matrix, dynx the whole.
 
-The command needs g++ and the packages cmeel-cppadcodegen, cmeel-cppad and cmeel-eigen beside `pin`, whose
-folder ``--prefix`` names (``.../site-packages/cmeel.prefix``). Building the generator takes some minutes and
-4 GB of memory; ``--folder`` keeps it and the generated code. Results are compared before anything is timed.
-Times are processor times of one thread for a sample, as medians of rounds in which both run in turn.
+The command needs g++, gcc and the packages cmeel-cppadcodegen, cmeel-cppad and cmeel-eigen beside `pin`,
+whose folder ``--prefix`` names (``.../site-packages/cmeel.prefix``). Building the generator takes some
+minutes and 4 GB of memory; ``--folder`` keeps it and the generated code. Results are compared before anything
+is timed. Times are processor times of one thread for a sample, as medians of rounds in which both run in
+turn. The ratio is the median of the ratios of the rounds. The last line has the time of a mass matrix over
+that of inverse dynamics for each robot.
 """
 
 from __future__ import annotations
 
 import argparse
 import ctypes
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from dynx.backends import backend
+from dynx.compiled.derivatives import Derivatives
 from dynx.engines.pinocchio.library import pin
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
 
-QUANTITIES = ("inverse_dynamics", "mass_matrix")
+QUANTITIES = (
+    "inverse_dynamics",
+    "forward_dynamics",
+    "mass_matrix",
+    "inverse_dynamics_derivatives",
+    "forward_dynamics_derivatives",
+)
+SYMMETRIC = ("mass_matrix", "dtau_da", "da_dtau")
+"""Results of which the generated code computes the upper triangle."""
+ROBOTS = ("ur5", "panda", "a1:floating", "go2:floating", "talos:floating", "g1:floating")
+LOCKED = {"panda": {"panda_finger_joint1": 0.02, "panda_finger_joint2": 0.02}}
+"""Positions [m] of locked joints, of which one mimics the other."""
 SAMPLES = 4096
 ROUNDS = 30
 TOLERANCE = 1e-9
-"""Largest difference, relative to the largest entry."""
+"""Largest difference, relative to the largest entry of the result."""
 SOURCE = Path(__file__).parent / "libraries" / "generated_code.cpp"
+
+PACKAGES = {
+    "cmeel-cppadcodegen": "cppad/cg.hpp",
+    "cmeel-cppad": "cppad/cppad.hpp",
+    "cmeel-eigen": "eigen3/Eigen/Core",
+    "pin": "pinocchio/codegen/cppadcg.hpp",
+}
+"""A header of each package that the generator is built from."""
+
+
+def missing(prefix: Path) -> str:
+    """Return what the command needs and does not find, or an empty text."""
+    programs = [program for program in ("g++", "gcc") if shutil.which(program) is None]
+    packages = [name for name, header in PACKAGES.items() if not (prefix / "include" / header).exists()]
+    found = [f"no {' and no '.join(programs)} in the search path"] if programs else []
+    if packages:
+        found.append(f"{prefix} lacks headers: pip install {' '.join(packages)}")
+    return "; ".join(found)
+
+
+def robot_named(text: str) -> Model:
+    """Return a robot by its name, which may end with ``:floating``. Joints that mimic others are locked,
+    since Pinocchio's model has none."""
+    name, _, base = text.partition(":")
+    kind: Literal["fixed", "floating"] = "floating" if base == "floating" else "fixed"
+    return load(name, base=kind, lock=LOCKED.get(name))
 
 
 def build_generator(folder: Path, prefix: Path) -> Path:
@@ -77,62 +119,97 @@ def calls(library: ctypes.CDLL, model: Model, quantity: str) -> dict[str, Callab
     q = np.stack([model.random(rng) for _ in range(SAMPLES)])
     v, last = rng.uniform(-1.0, 1.0, (2, SAMPLES, nv))
     x = np.concatenate([q, v, last], axis=1)
-    y = np.zeros((SAMPLES, nv * (nv + 1) // 2 if quantity == "mass_matrix" else nv))
+    ours = own_call(model, quantity, q, v, last)
+    expected = [columns(name, result) for name, result in ours().items()]
+    y = np.zeros((SAMPLES, sum(column.shape[1] for column in expected)))
     addresses = [ctypes.c_void_p(array.ctypes.data) for array in (x, y)]
 
     def theirs(_alive: object = (x, y)) -> None:
         library.all(ctypes.c_long(SAMPLES), *addresses)
 
-    robot = backend("compiled", model, threads=1)
-    arguments: tuple[Floats, ...] = (q,) if quantity == "mass_matrix" else (q, v, last)
-    out = np.zeros((SAMPLES, nv, nv) if quantity == "mass_matrix" else (SAMPLES, nv))
-    function = getattr(robot, quantity)
-
-    def ours() -> None:
-        function(*arguments, out=out)
-
     theirs()
-    ours()
-    upper = (slice(None), *np.triu_indices(nv))
-    found = out[upper] if quantity == "mass_matrix" else out
-    difference = float(np.abs(found - y).max() / np.abs(y).max())
-    if not difference <= TOLERANCE:
-        raise SystemExit(f"{quantity}: results differ by {difference:.1e} of the largest entry")
+    first = 0
+    for result in expected:
+        end = first + result.shape[1]
+        difference = float(np.abs(y[:, first:end] - result).max() / np.abs(result).max())
+        if not difference <= TOLERANCE:
+            raise SystemExit(f"{quantity}: results differ by {difference:.1e} of the largest entry")
+        first = end
     return {"generated C": theirs, "dynx": ours}
 
 
+def own_call(
+    model: Model, quantity: str, q: Floats, v: Floats, last: Floats
+) -> Callable[[], dict[str, Floats]]:
+    """Return a call of dynx, which returns its results by name."""
+    if quantity.endswith("_derivatives"):
+        derivatives = getattr(Derivatives(model, threads=1), quantity)
+        return lambda: derivatives(q, v, last)._asdict()
+    function = getattr(backend("compiled", model, threads=1), quantity)
+    arguments = (q,) if quantity == "mass_matrix" else (q, v, last)
+    out = np.zeros((SAMPLES, *([model.nv] * (2 if quantity == "mass_matrix" else 1))))
+    return lambda: {quantity: function(*arguments, out=out)}
+
+
+def columns(name: str, result: Floats) -> Floats:
+    """Return the entries (samples, n) of a result in the order of the generated code."""
+    rows, others = np.triu_indices(result.shape[-1])
+    return result[:, rows, others] if name in SYMMETRIC else result.reshape(SAMPLES, -1)
+
+
+def timed(both: dict[str, Callable[[], object]]) -> Floats:
+    """Return the times of the rounds for a sample [ns], a column for each implementation."""
+    spent = np.empty((ROUNDS, len(both)))
+    for row in spent:
+        for k, call in enumerate(both.values()):
+            start = time.thread_time()
+            call()
+            row[k] = 1e9 * (time.thread_time() - start) / SAMPLES
+    return spent
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print a line for each robot and quantity."""
+    """Print a table with a row for each robot and quantity; return 1 if there is no code for one, and 2 if
+    something that the command needs is missing."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.generated_code", description=__doc__)
-    parser.add_argument("robots", nargs="+", metavar="ROBOT[:floating]")
+    parser.add_argument("robots", nargs="*", metavar="ROBOT[:floating]", default=ROBOTS)
     parser.add_argument("--prefix", type=Path, default=Path(pin.__file__).parents[4], help="cmeel.prefix")
     parser.add_argument("--folder", type=Path, help="of what is built (default: a temporary folder)")
     parser.add_argument("--quantity", choices=QUANTITIES, action="append", help="default: all")
     options = parser.parse_args(arguments)
-    if not (options.prefix / "include" / "cppad" / "cg.hpp").exists():
-        print(f"{options.prefix} lacks CppADCodeGen: pip install cmeel-cppadcodegen cmeel-cppad cmeel-eigen")
+    if lacking := missing(options.prefix):
+        print(lacking, file=sys.stderr)
         return 2
+    models = {name: robot_named(name) for name in options.robots}
+    if coupled := [name for name, model in models.items() if model.mechanism.coupling is not None]:
+        print(
+            f"joints that mimic others are not in Pinocchio's model of {', '.join(coupled)}", file=sys.stderr
+        )
+        return 2
+    shares, failed = [], False
+    print("| robot | quantity | generated C [ns] | dynx [ns] | ratio |\n|---|---|---|---|---|", flush=True)
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.folder or Path(temporary)
         program = build_generator(folder, options.prefix)
-        for name in options.robots:
-            robot, _, base = name.partition(":")
-            model = load(robot, base="floating" if base == "floating" else "fixed")
+        for name, model in models.items():
+            own: dict[str, float] = {}
             for quantity in options.quantity or QUANTITIES:
-                both = calls(generated(folder, program, name, model, quantity), model, quantity)
-                spent: dict[str, list[float]] = {each: [] for each in both}
-                for _ in range(ROUNDS):
-                    for each, call in both.items():
-                        start = time.thread_time()
-                        call()
-                        spent[each].append(1e9 * (time.thread_time() - start) / SAMPLES)
-                theirs, ours = (float(np.median(spent[each])) for each in both)
-                print(
-                    f"{name} {quantity}: generated C {theirs:.0f} ns, dynx {ours:.0f} ns, "
-                    f"ratio {theirs / ours:.1f}",
-                    flush=True,
-                )
-    return 0
+                try:
+                    library = generated(folder, program, name, model, quantity)
+                except subprocess.CalledProcessError as error:
+                    print(f"no code for {quantity} of {name}: {error}", file=sys.stderr)
+                    failed = True
+                    continue
+                spent = timed(calls(library, model, quantity))
+                theirs, own[quantity] = np.median(spent, axis=0).tolist()
+                ratio = float(np.median(spent[:, 0] / spent[:, 1]))
+                row = (name.replace(":", ", "), quantity.replace("_", " "), f"{theirs:,.0f}")
+                print(f"| {' | '.join(row)} | {own[quantity]:,.0f} | {ratio:.1f} |", flush=True)
+            if {"mass_matrix", "inverse_dynamics"} <= own.keys():
+                shares.append(f"{name.partition(':')[0]} {own['mass_matrix'] / own['inverse_dynamics']:.1f}")
+    if shares:
+        print(f"time of a mass matrix over that of inverse dynamics: {', '.join(shares)}")
+    return int(failed)
 
 
 if __name__ == "__main__":
