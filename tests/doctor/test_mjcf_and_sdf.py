@@ -494,6 +494,22 @@ def test_undefined_elements_of_included_files_are_named(tmp_path: Path) -> None:
 
 
 @needs_all
+def test_a_manifest_without_a_version_is_named(tmp_path: Path) -> None:
+    tool = '<sdf version="1.7"><model name="tool"><link name="body"/></model></sdf>'
+    (tmp_path / "arm").mkdir()
+    (tmp_path / "arm/model.sdf").write_text(tool)
+    manifest = tmp_path / "arm/model.config"
+    path = tmp_path / "robot.sdf"
+    path.write_text(trap_case("DX711").source.text.replace("model://dx711_tool", "model://arm"))
+    for version in ("", ' version="1.7"'):
+        manifest.write_text(f"<model>\n<sdf{version}>model.sdf</sdf></model>")
+        report = diagnose(path, base="floating", engines=["drake"], samples=1)
+        assert report.status == "explained", report.unexplained
+        found = [each.message for each in report.differences if each.rule == "DX720"]
+        assert found == ([] if version else ["in arm/model.config, line 2, <sdf> has no version"])
+
+
+@needs_all
 @pytest.mark.parametrize(
     ("uri", "read_by_drake"),
     [

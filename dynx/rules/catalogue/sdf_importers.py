@@ -558,7 +558,8 @@ class FaultsOfIncludedFiles(Rule):
     - Drake 1.51 refuses the file ("Unable to find uri") if an included file names a model as
       ``model://arm``, ``arm``, ``arm/model.sdf`` or ``arm.sdf``, whatever the package map of its parser has
       (DX711). Drake also refuses the file if an included file has an element that SDF does not define
-      (DX721).
+      (DX721). If the ``model.config`` of an included model has ``<sdf>`` without ``version``, Drake refuses
+      the file or crashes.
     - PyBullet 3.2.7 (``loadSDF``) ignores ``<include>`` (DX708).
 
     What to do: write one file with all links (``dynx convert --to sdf``). Or examine each included file by
@@ -584,6 +585,19 @@ class FaultsOfIncludedFiles(Rule):
                 for inner, fault in _faults_in(included):
                     found = f"in the included file {file}, line {inner}, {fault}"
                     yield Detection(None, None, line, found)
+                for entry in _entries_without_version(Path(path).with_name(MODEL_MANIFEST)):
+                    found = (
+                        f"in {Path(path).parent.name}/{MODEL_MANIFEST}, line {entry}, <sdf> has no version"
+                    )
+                    yield Detection(None, None, line, found)
+
+
+def _entries_without_version(manifest: Path) -> list[int]:
+    """Return the lines of a manifest, if there is one, that name a file of no version of SDF."""
+    if not manifest.is_file():
+        return []
+    entries = XmlSource(read_file(str(manifest)), str(manifest)).root.all("sdf")
+    return [each.line for each in entries if not each.attributes.get("version", "").strip()]
 
 
 def _faults_in(source: XmlSource) -> Iterator[tuple[int, str]]:
