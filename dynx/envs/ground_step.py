@@ -41,7 +41,8 @@ from dynx.steppers.layout import Layout, RobotLayout
 from dynx.world.preparation import prepare
 
 SWEEPS = Sweeps(tolerance=1e-5, most=60)
-"""When the sweeps of a step end [m/s]."""
+"""When the sweeps of a step end [m/s] of a robot with one point on each body. Residuals of several points on
+a body would reach 0.1 m/s with these; a robot with such points has those of `Sweeps.of_points`."""
 
 CHUNK = 256
 """Number of environments that a thread takes at a time. Their arrays fit into the second-level cache."""
@@ -268,6 +269,11 @@ class GroundStep(TaskStep):
         """Return lanes of environments."""
         return GroundLanes(self, count, max_steps)
 
+    @cached_property
+    def _sweeps(self) -> Sweeps:
+        redundant = self._contacts.touching.has_redundant_points(self._mechanism)
+        return Sweeps.of_points(redundant=True) if redundant else SWEEPS
+
     @property
     def substeps(self) -> int:
         """Number of steps of the robot in a control step."""
@@ -359,7 +365,7 @@ class GroundStep(TaskStep):
             mechanism,
             joints,
             replace(contacts.touching, shapes=shapes),
-            SWEEPS,
+            self._sweeps,
             motion.step_dt,
             state.q,
             state.v,

@@ -237,11 +237,12 @@ def contact_step(
     The length of the step is `h` [s]. `target` (n joints,) are positions; `impulses` are those of the step
     before: normal and tangents of each contact point, then those of the joints with dry friction or stops.
     `regrouped` is the mechanism with base parameters (`dynx.rbd.base_parameters`), which take fewer
-    operations for the bias torque. The residual is the largest violation of the laws of contact.
+    operations for the mass matrix and the bias torque. The residual is the largest violation of the laws of
+    contact.
     """
     base, last = mechanism.nv - len(mechanism.bodies), mechanism.nv - 1
-    M = mass_matrix(mechanism, q)
-    bias = bias_torque(mechanism if regrouped is None else regrouped, q, v)
+    moving = mechanism if regrouped is None else regrouped
+    M, bias = mass_matrix(moving, q), bias_torque(moving, q, v)
     positions, rates = q[len(q) - len(mechanism.bodies) :], v[base:]
     rows, gaps = contact_rows(mechanism, touching, q)
     motors, stiffness = motor_law(joints, h, positions, rates, target)
