@@ -70,10 +70,13 @@ class RobotLayout:
     name: str
     model: Model
     q: Floats
+    """Configuration (nq,) at the start, in the coordinates of the model."""
     v: Floats
+    """Velocity (nv,) at the start."""
     lower: Floats
     """Lower limits (n,) of the joints [rad or m]; minus infinity where there is none."""
     upper: Floats
+    """Upper limits (n,) of the joints [rad or m]; infinity where there is none."""
     damping: Floats
     """Viscous damping (n,) of the joints [N m s/rad or N s/m]."""
     friction: Floats
@@ -96,7 +99,7 @@ class RobotLayout:
 
     def joint_positions(self, q: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the position of each moving joint at q (nq,), its lower and its upper limit, (n,) each; of a
-        ball joint the angle of its rotation."""
+        ball joint the angle of its rotation, with minus infinity as the lower limit."""
         model = self.model
         if not model.ball_joints:
             return model.mechanism.tree_q(q)[7 if model.floating else 0 :], self.lower, self.upper

@@ -56,7 +56,7 @@ class BodyState(NamedTuple):
 
 
 class PartStates(dict[str, Part]):
-    """States by name; a name that does not exist is answered with the nearest."""
+    """States by name; an unknown name raises UnknownNameError, with the nearest."""
 
     def __missing__(self, name: object) -> Part:
         raise UnknownNameError(f"the world has no state of {shown(name)}{nearest(name, self)}")

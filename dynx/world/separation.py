@@ -53,23 +53,27 @@ class Separation:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """Name of the part that is farthest apart at each time; empty where nothing moves."""
+        """Name of the part that is farthest apart at each time; empty without parts."""
         if not self.names:
             return ("",) * len(self.times)
         return tuple(self.names[k] for k in self.distances.argmax(axis=1).tolist())
 
     @property
     def farthest(self) -> tuple[int, int]:
-        """Index of the time, and of the name, of the largest distance."""
+        """Index of the time, and of the name, of the largest distance. Raises ArgumentError where nothing was
+        compared."""
+        if not self.distances.size:
+            raise ArgumentError(f"{' and '.join(self.records)} have no part in common, so none is farthest")
         k, column = np.unravel_index(int(np.argmax(self.distances)), self.distances.shape)
         return int(k), int(column)
 
     def first_beyond(self, distance: float) -> tuple[float, str] | None:
-        """Return the first time at which something is farther apart than `distance`, and its name."""
+        """Return the first time at which a part is farther apart than `distance`, and its name; None if none
+        is."""
         if not is_real(distance):
             raise ArgumentError(f"distance is {shown(distance)}; wanted a number")
         beyond = np.flatnonzero(self.distance > distance)
-        if not beyond.size:
+        if not beyond.size or not self.names:
             return None
         k = int(beyond[0])
         return float(self.times[k]), self.names[int(np.argmax(self.distances[k]))]
@@ -128,5 +132,6 @@ def separation(ours: Record, theirs: Record, times: Floats | None = None) -> Sep
 
 
 def _some(record: Record) -> str:
+    """List the first channels of a record."""
     listed = list(record.channels)[:3]
     return (", ".join(listed) or "nothing") + (", ..." if len(record.channels) > 3 else "")

@@ -121,3 +121,12 @@ def test_the_text_of_a_separation_is_one_short_line() -> None:
     theirs = Record("theirs", t, {"cube": position_channel("cube", np.zeros((11, 3)))})
     text = "<Separation of ours and theirs: at most 0.5 m, cube at 1 s, 11 times>"
     assert repr(separation(ours, theirs)) == text
+
+
+def test_records_without_parts_have_no_farthest() -> None:
+    empty = Record("a", np.array([0.0, 1.0]), {})
+    apart = separation(empty, replace(empty, name="b"))
+    assert (apart.largest, apart.parts) == (0.0, ("", ""))
+    assert apart.first_beyond(-1.0) is None
+    with pytest.raises(ArgumentError, match="a and b have no part in common"):
+        _ = apart.farthest

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from dynx.errors import DescriptionError, shown
 from dynx.model.elements import Note
 
+# The longer ones of two that begin alike come first.
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
     (codecs.BOM_UTF32_LE, "utf-32-le"),
@@ -57,7 +58,7 @@ def decode_with_encoding(data: bytes, source: str, notes: list[Note]) -> tuple[s
     declared = _DECLARED.match(data)
     name = declared.group(1).decode("ascii").lower().replace("_", "-") if declared else "utf-8"
     # The declaration itself was read as ASCII, so the text cannot be in 16 or 32 bits.
-    if name in ("utf8", "utf-8", "ascii", "us-ascii") or name.startswith(_WIDE):
+    if name in ("utf8", "utf-8", "utf-8-sig", "ascii", "us-ascii") or name.startswith(_WIDE):
         try:
             return data.decode("utf-8"), "utf-8"
         except UnicodeDecodeError as error:

@@ -99,5 +99,13 @@ def findings(report: SameReport) -> Iterator[SameFinding]:
 
 
 def base_of(report: SameReport) -> str:
-    """Return the base of the first description, and of the second unless there is a finding `base`."""
+    """Return the base of the first description; the second has the other one if there is a finding `base`."""
     return "fixed" if report.T_first_second is None else "floating"
+
+
+def bases_text(report: SameReport) -> str:
+    """Write the base of both descriptions: ``fixed base``, or ``fixed base against a floating one``."""
+    base = base_of(report)
+    other = "floating" if base == "fixed" else "fixed"
+    differs = any(each.kind == "base" for each in report.unmatched)
+    return f"{base} base against a {other} one" if differs else f"{base} base"

@@ -13,7 +13,7 @@ from dynx.model.loading import read_description
 from dynx.model.xml.several_files import file_of_line
 from dynx.model.xml.source import XmlSource
 from dynx.same.formats.baseline import SameBaseline
-from dynx.same.formats.findings import base_of
+from dynx.same.formats.findings import bases_text
 from dynx.same.report import SameReport
 
 if TYPE_CHECKING:
@@ -35,11 +35,10 @@ def html_page(
     baseline: SameBaseline | None = None,
 ) -> str:
     """Make the page, in ASCII, with lines of both `texts`, and the `command` line that reproduces it."""
-    footer = f"dynx {__version__}. Tolerance {report.tolerance:g}, {base_of(report)} base. "
+    footer = f"dynx {__version__}. Tolerance {report.tolerance:g}, {bases_text(report)}. "
     return page_text(
         template_environment().get_template("same.html.j2"),
         report=report,
-        base=base_of(report),
         texts=texts,
         changes=changes(report, texts[1]),
         comparison=None if baseline is None else baseline.compare(report),

@@ -302,3 +302,14 @@ def test_repair_takes_linear_time(part: str) -> None:
     start = time.process_time()
     repaired("<a>" + part * 200_000)
     assert time.process_time() - start < 10.0
+
+
+@pytest.mark.parametrize(
+    "name", ["utf-8", "UTF8", "utf-8-sig", "utf_8_sig", "ascii", "utf-16", "latin1", "u8"]
+)
+@given(st.text(alphabet="ab<&ä", max_size=8), st.booleans())
+def test_a_text_is_encoded_as_it_was_read(name: str, comment: str, marked: bool) -> None:
+    data = f'<?xml version="1.0" encoding="{name}"?>\n<robot name="r"><!--{comment}--></robot>\n'.encode()
+    data = b"\xef\xbb\xbf" * marked + data
+    source = XmlSource(data, "robot.urdf")
+    assert source.form.encode(source.text) == data

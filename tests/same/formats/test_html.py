@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from dynx.model.loading import load
+from dynx.model.tree import Base
 from dynx.same import same_robot
 from dynx.same.formats import SameBaseline, html_page
 from dynx.same.formats.html import description_text
@@ -54,3 +56,12 @@ def test_a_file_that_includes_others_has_no_excerpts(tmp_path: Path) -> None:
     paths = [str(tmp_path / name) for name in ("a.xml", "b.xml")]
     assert same_robot(*paths).same
     assert [description_text(path) is None for path in paths] == [False, True]
+
+
+def test_the_page_names_the_bases() -> None:
+    assert "fixed base." in Page(html_page(alike())).text
+    model = load(FIRST)
+    pairs: tuple[tuple[Base, Base], ...] = (("fixed", "floating"), ("floating", "fixed"))
+    for first, second in pairs:
+        report = same_robot(model.with_base(first), model.with_base(second))
+        assert f"{first} base against a {second} one." in Page(html_page(report)).text
