@@ -26,7 +26,7 @@ from dynx.spatial.se3 import inverse
 UNBOUNDED = (-INFINITY, INFINITY)
 
 ROUNDING = 1e-14
-"""Difference of two coefficients of a polynomial, relative to the largest coefficient, that is rounding."""
+"""Difference of two coefficients of a polynomial, relative to the largest number, that is rounding."""
 
 
 # -- tendons ----------------------------------------------------------------------------------------------
@@ -193,7 +193,8 @@ class Constraints:
         """Check whether two constraints of one type hold the same, first and second part as they are."""
         if mine.type in ("joint", "tendon"):
             names, numbers = self._coupling(other)
-            return mine.objects == names and self._same_numbers(mine.absolute_polynomial, numbers)
+            same = self._same_numbers(mine.absolute_polynomial, numbers, _largest(mine, other))
+            return mine.objects == names and same
         return self._same_places(mine, self._ends(other))
 
     def _are_swapped(self, mine: StatedEquality, other: StatedEquality) -> bool:
@@ -203,7 +204,8 @@ class Constraints:
         names, (a, b, *higher) = self._coupling(other)
         if len(names) < 2 or any(higher) or b == 0.0 or mine.objects != names[::-1]:
             return False
-        return self._same_numbers(mine.absolute_polynomial, np.array([-a / b, 1.0 / b, 0.0, 0.0, 0.0]))
+        swapped = np.array([-a / b, 1.0 / b, 0.0, 0.0, 0.0])
+        return self._same_numbers(mine.absolute_polynomial, swapped, _largest(mine, other))
 
     def _coupling(self, other: StatedEquality) -> tuple[tuple[str, ...], Floats]:
         """Return the names of our joints or tendons for a coupling of theirs, and its polynomial in our
@@ -215,9 +217,10 @@ class Constraints:
         signs = [sign for _, sign in joints] + [1]
         return tuple(name for name, _ in joints), signs[0] * numbers * signs[1] ** np.arange(5.0)
 
-    def _same_numbers(self, mine: Floats, other: Floats) -> bool:
-        # A polynomial that is written for other reference positions has rounding in each coefficient.
-        rounding = ROUNDING * float(max(np.max(np.abs(mine)), np.max(np.abs(other))))
+    def _same_numbers(self, mine: Floats, other: Floats, largest: float) -> bool:
+        # A polynomial that is written for other reference positions has rounding in each coefficient, of the
+        # largest number that is written: the coefficients themselves may be 0.
+        rounding = ROUNDING * float(max(np.max(np.abs(mine)), np.max(np.abs(other)), largest))
         return not any(
             abs(a - b) > rounding and differs(a, b, self._tolerance) for a, b in zip(mine, other, strict=True)
         )
@@ -259,6 +262,12 @@ class Constraints:
 
     def _is_near(self, T: Array) -> bool:
         return float(np.linalg.norm(rounded(T[:3, 3]))) <= self._reach
+
+
+def _largest(*equalities: StatedEquality) -> float:
+    """Return the largest coefficient or reference position that couplings state, without its sign."""
+    numbers = (number for each in equalities for number in (*each.polynomial, *each.references))
+    return max(map(abs, numbers), default=0.0)
 
 
 # -- gravity compensation ---------------------------------------------------------------------------------

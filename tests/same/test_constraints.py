@@ -70,6 +70,12 @@ EQUAL = {
             '<equality><joint joint1="j" joint2="k" polycoef="-0.455 0.778 2e-17 -0.181 0"/></equality>'
         ),
     ),
+    "rounding where all coefficients are 0": (
+        document('<equality><joint joint1="k" joint2="j" polycoef="0 0 0 0 0"/></equality>'),
+        document(
+            '<equality><joint joint1="k" joint2="j" polycoef="-0.30000000000000004 0 0 0 0"/></equality>'
+        ).replace('name="k"', 'name="k" ref="0.3"'),
+    ),
     "a keyframe by a reversed axis": (
         document('<keyframe><key name="home" qpos="0.1 0.2 0.3"/></keyframe>'),
         document('<keyframe><key name="home" qpos="0.1 -0.2 0.3"/></keyframe>', "-1"),
