@@ -42,6 +42,9 @@ PATIENCE = 180.0
 PICTURE = 2000.0
 """Time in which software draws a picture beside other tests [ms]."""
 
+QUIET = 350.0
+"""Time without a new picture after which a page rests [ms]; one at rest draws about once a second."""
+
 FIRST_PLACES = ((-5.0, 0.0, 0.0), (3.0, 3.0, 3.0))
 """Places (3,) [m] of the camera of a page that has not read yet from where the viewer looks: that of
 react-three-fiber, and that of viser. On a busy machine a page has each for seconds."""
@@ -54,14 +57,25 @@ class Opened:
         self.page = page
         self.errors: list[str] = []
         self.requests: list[str] = []
-        page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
-        page.on("pageerror", lambda error: self.errors.append(str(error)))
-        page.on("request", lambda request: self.requests.append(request.url))
+        self._listeners: dict[str, Callable[[Any], None]] = {
+            "console": lambda m: self.errors.append(m.text) if m.type == "error" else None,
+            "pageerror": lambda error: self.errors.append(str(error)),
+            "request": lambda request: self.requests.append(request.url),
+        }
+        for event, listener in self._listeners.items():
+            page.on(event, listener)
 
     def go_to(self, url: str) -> None:
         """Open an address and wait until the page draws."""
         self.page.goto(url)
         self.page.wait_for_selector("canvas[data-engine]", timeout=1e3 * PATIENCE)
+
+    def leave(self) -> None:
+        """Leave the address, so that the page may be opened at another."""
+        self.page.goto("about:blank")
+        self.page.context.clear_permissions()
+        for event, listener in self._listeners.items():
+            self.page.remove_listener(event, listener)
 
 
 OpenPage = Callable[..., Opened]
@@ -80,28 +94,82 @@ def browser() -> Iterator[Any]:
         running.close()
 
 
+@pytest.fixture(scope="session")
+def kept_pages(browser: Any) -> Iterator[list[Any]]:
+    """Pages that tests have left: one of them opens an address in two thirds of the time of a new one."""
+    kept: list[Any] = []
+    yield kept
+    for page in kept:
+        page.close()
+
+
 @pytest.fixture
-def open_page(browser: Any) -> Iterator[Callable[..., Opened]]:
-    """Open addresses, or empty pages, of a width and a height [pixels], which are closed after the test; with
-    `accelerated` they do what they do on a graphics processor."""
-    pages = []
+def open_page(
+    browser: Any, kept_pages: list[Any], request: pytest.FixtureRequest
+) -> Iterator[Callable[..., Opened]]:
+    """Open addresses, or empty pages, of a width and a height [pixels], which are left or closed after the
+    test; with `accelerated` they do what they do on a graphics processor."""
+    closed: list[Opened] = []
+    left: list[Opened] = []
 
     def opened(
         url: str | None = None, size: tuple[int, int] = (900, 450), *, accelerated: bool = False
     ) -> Opened:
-        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        # What a test adds to an empty page stays there, so that page is a new one.
+        is_plain = url is not None and not accelerated
+        viewport = {"width": size[0], "height": size[1]}
+        if is_plain and kept_pages:
+            page = kept_pages.pop()
+            page.set_viewport_size(viewport)
+        else:
+            page = browser.new_page(viewport=viewport)
         if accelerated:
             page.add_init_script(AS_IF_ON_A_GRAPHICS_PROCESSOR)
         page.set_default_timeout(1e3 * PATIENCE)
-        pages.append(page)
         found = Opened(page)
+        (left if is_plain else closed).append(found)
         if url is not None:
             found.go_to(url)
         return found
 
+    failed = request.session.testsfailed
     yield opened
-    for page in pages:
-        page.close()
+    for each in left:
+        if each.page.is_closed() or kept_pages or request.session.testsfailed > failed:
+            closed.append(each)
+        else:
+            each.leave()
+            kept_pages.append(each.page)
+    for each in closed:
+        each.page.close()
+
+
+AT_REST = """([quiet, longest]) => new Promise((done) => {
+  const start = performance.now();
+  let drawn, since = start, looks = 0;
+  const look = () => {
+    const picture = window.__viserMutable?.scene?.__r3f?.root?.getState?.();
+    const last = picture?.gl.info.render.frame ?? -1, now = performance.now();
+    if (last !== drawn) [drawn, since, looks] = [last, now, 0];
+    looks += 1;
+    if (now - start > longest || (last > 0 && now - since > quiet && looks > 20)) done();
+    else requestAnimationFrame(look);
+  };
+  look();
+})"""
+"""Script that waits until the page, which looks 60 times a second for what it has to draw, draws nothing for
+`QUIET`. A page that is busy with something else looks less often, so it must also have looked 20 times."""
+
+
+def wait_for_rest(page: Opened, viewer: Viewer | None = None) -> None:
+    """Wait until a page draws nothing anew, but at most for `PICTURE`; with its viewer, first for all shapes,
+    without which it may rest, too."""
+    if viewer is not None:
+        names = [node.name for nodes in viewer.view.visuals.values() for node in nodes]
+        page.page.wait_for_function(
+            "names => names.every((name) => window.__viserMutable?.nodeRefFromName[name])", arg=names
+        )
+    page.page.evaluate(AT_REST, [QUIET, PICTURE])
 
 
 def until(condition: Callable[[], object], what: str) -> None:

@@ -17,7 +17,7 @@ from dynx.steppers.camera import Camera
 from dynx.viewer import Viewer, view
 from dynx.viewer.moving_picture import MOVING
 from dynx.world import Material, Scene, SceneRobot, World, box, ground
-from tests.viewer.conftest import PICTURE, OpenPage, connected, pixel_of, until
+from tests.viewer.conftest import OpenPage, connected, pixel_of, until, wait_for_rest
 
 DARK_GREY = Material(rgba=(0.25, 0.25, 0.25, 1.0))
 CUBE = box("cube", (0.4, 0.4, 0.4), mass=1.0, pose=Pose((0.0, 0.0, 0.2)), material=DARK_GREY)
@@ -81,7 +81,7 @@ def test_the_page_hides_parts_and_lets_them_be_seen_through(open_page: OpenPage)
     with World(SCENE) as world, world.view(steps=False) as viewer:
         page = open_page(viewer.url)
         (client,) = connected(viewer)
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page, viewer)
         place = pixel_of(client, CUBE.pose.matrix[:3, 3])
         solid = colour_at(page.page, place)
         viewer.set_opacity(0.5, "cube")
@@ -107,7 +107,7 @@ def test_views_are_saved_and_shown_again_in_the_page(open_page: OpenPage) -> Non
         viewer.save_view("above", above)
         page = open_page(viewer.url)
         (client,) = connected(viewer)
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page, viewer)
         start = viewer.camera
         assert start.size == (client.camera.image_width, client.camera.image_height)
         point = np.array([0.1, 0.2, 0.3])

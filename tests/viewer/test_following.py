@@ -20,7 +20,7 @@ from dynx.spatial.so3 import rotation_from_rpy
 from dynx.viewer import Viewer
 from dynx.viewer.following import _BEFORE
 from dynx.world import Material, Scene, SceneBody, SceneRobot, World, ground
-from tests.viewer.conftest import PICTURE, OpenPage, connected, until
+from tests.viewer.conftest import PICTURE, OpenPage, connected, until, wait_for_rest
 
 ORANGE = Material(rgba=(1.0, 0.4, 0.0, 1.0))
 
@@ -101,7 +101,7 @@ def test_the_subject_stays_where_it_is_in_each_picture(open_page: OpenPage) -> N
     with World(SCENE) as world, world.view(steps=False) as viewer:
         page = open_page(viewer.url, (700, 425))
         connected(viewer)
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page, viewer)
         start, origin, ended = silhouette(page.page), np.zeros(3), threading.Event()
         assert start[2] > 0.05
 
@@ -140,7 +140,7 @@ def test_the_subject_stays_where_it_is_in_each_picture(open_page: OpenPage) -> N
             driver.join()
         assert np.linalg.norm(origin) > 0.5
         viewer.follow(None)
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page)
         place(viewer, origin + np.array([0.5, 0.0, 0.0]))
         until(lambda: not alike(silhouette(page.page), nearer, BOUND), "the camera to stay")
         assert not page.errors
@@ -161,20 +161,22 @@ def test_a_page_follows_a_robot_by_its_name(open_page: OpenPage) -> None:
         T = np.eye(4)
         T[2, 3] = 0.5
         viewer.view.drawn.place({"r2d2/base": T})
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page, viewer)
         until(lambda: silhouette(page.page)[2] > 0.05, "the robot")
         start = silhouette(page.page)
 
         def move(name: str | None) -> None:
             viewer.follow(name)
-            page.page.wait_for_timeout(PICTURE)
+            wait_for_rest(page)
             T = viewer.view.drawn.pose("r2d2/base")
             T[:3, 3] += [0.5, 0.4, 0.0]
             viewer.view.drawn.place({"r2d2/base": T})
-            page.page.wait_for_timeout(PICTURE)
+            wait_for_rest(page)
 
         move("r2d2")
         until(lambda: alike(silhouette(page.page), start, BOUND), "the view of the start")
         move(None)
         until(lambda: not alike(silhouette(page.page), start, BOUND), "another view")
+        wait_for_rest(page)
+        assert not alike(silhouette(page.page), start, BOUND)
         assert not page.errors

@@ -18,7 +18,7 @@ from dynx.steppers.camera import Camera
 from dynx.viewer import Viewer
 from dynx.viewer.moving_picture import COARSE_WHILE_MOVING, MOVING
 from dynx.viewer.moving_picture import TRIANGLES as COARSE
-from tests.viewer.conftest import PATIENCE, PICTURE, Opened, OpenPage, connected, until
+from tests.viewer.conftest import PATIENCE, PICTURE, Opened, OpenPage, connected, until, wait_for_rest
 
 SIZES = """() => {
   const canvas = document.querySelector("canvas[data-engine]"), box = canvas.getBoundingClientRect();
@@ -60,7 +60,7 @@ def test_a_page_has_fewer_pixels_while_a_part_or_its_camera_moves(open_page: Ope
             until(lambda: abs(ratio() - MOVING) < 0.01, "fewer pixels while a part moves")
             assert sharp(viewer.screenshot((600, 400), timeout=PATIENCE)) > SHARP
         until(lambda: abs(ratio() - 1.0) < 0.01, "all pixels after the motion")
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page)
         page.page.mouse.move(200, 200)
         page.page.mouse.down()
 
@@ -149,7 +149,7 @@ def test_a_page_draws_fewer_triangles_while_a_part_moves(
         assert whole > 10_000
         viewer.look_from(Camera.look_at((2.5, -2.5, 1.0), (0.0, 0.0, 0.0)))
         until(lambda: triangles() >= whole, "the whole ball at rest")
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page)
         area, colour = area_and_colour(page)
         assert area > 0.003
         with Moving(viewer):
@@ -178,7 +178,7 @@ def test_cells_grow_where_many_triangles_move(
                 return low < counts[-1] < high
 
             until(partial(between, 10_000, math.inf), "the whole ball at rest")
-            page.page.wait_for_timeout(PICTURE)
+            wait_for_rest(page)
             still = area_and_colour(page)
             with Moving(viewer):
                 until(partial(between, 100, 10_000), "a coarse ball")

@@ -18,7 +18,7 @@ from dynx.steppers.camera import Camera
 from dynx.viewer import Viewer
 from dynx.viewer.drawn_robot import MIN_COPIES
 from dynx.viewer.occlusion import OCCLUSION, PATCHED
-from tests.viewer.conftest import PICTURE, OpenPage, connected, until
+from tests.viewer.conftest import PICTURE, OpenPage, connected, until, wait_for_rest
 from tests.viewer.test_shading import brightness
 
 SHADE = (0.85, 0.985)
@@ -62,15 +62,11 @@ def shown(
     """Return the colours (height, width, 3), from 0 to 255, that a page shows, once they do not change."""
     page = open_page(viewer.url, accelerated=accelerated)
     connected(viewer)
-    # Before the page has all shapes it may rest, too.
-    names = [node.name for nodes in viewer.view.visuals.values() for node in nodes]
-    page.page.wait_for_function(
-        "names => names.every((name) => __viserMutable?.nodeRefFromName[name])", arg=names
-    )
+    wait_for_rest(page, viewer)
     pictures = [by_page(viewer, camera)]
 
     def rests() -> bool:
-        page.page.wait_for_timeout(0.25 * PICTURE)
+        page.page.wait_for_timeout(0.1 * PICTURE)
         pictures.append(by_page(viewer, camera))
         # Between two of its shapes a page may rest, too.
         last = pictures[-4:]
@@ -164,7 +160,7 @@ def test_an_exported_page_has_it_where_a_graphics_processor_draws(
     for accelerated in (False, True):
         page = open_page(path.as_uri(), accelerated=accelerated)
         page.page.wait_for_function("__viserMutable?.nodeRefFromName['/robot/link0/link1/visual0']")
-        page.page.wait_for_timeout(2.0 * PICTURE)
+        wait_for_rest(page)
         picture = page.page.locator("canvas[data-engine]").screenshot()
         pictures.append(np.asarray(pillow.open(io.BytesIO(picture)).convert("RGB"), dtype=np.float64))
         assert page.errors == []

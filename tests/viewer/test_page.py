@@ -30,7 +30,6 @@ from dynx.world.camera import draw_picture
 from tests.conftest import needs_examples
 from tests.viewer.conftest import (
     PATIENCE,
-    PICTURE,
     Opened,
     OpenPage,
     antialiased,
@@ -38,6 +37,7 @@ from tests.viewer.conftest import (
     pixel_of,
     poses_of_nodes,
     until,
+    wait_for_rest,
     without_surroundings,
 )
 
@@ -173,7 +173,7 @@ def test_held_keys_the_pointer_and_choices_reach_the_program(open_page: OpenPage
         until(lambda: not viewer.keys, "no key")
 
         target = cube.pose.matrix[:3, 3]
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page, viewer)
 
         def seen() -> Any:
             page.page.mouse.move(*(pixel_of(client, target) + np.array([len(told) % 2, 0.0])))
@@ -310,10 +310,10 @@ def test_dragging_the_handle_solves_inverse_kinematics(open_page: OpenPage) -> N
             # The arrow is found under the pointer when a picture has been drawn.
             for action in (lambda: mouse.move(*held), mouse.down):
                 action()
-                page.page.wait_for_timeout(PICTURE)
+                wait_for_rest(page)
             for share in np.linspace(0.2, 1.0, 5):
                 mouse.move(*(held + share * (towards - held)))
-                page.page.wait_for_timeout(0.3 * PICTURE)
+                wait_for_rest(page)
             mouse.up()
             until(lambda: not np.array_equal(viewer.view.q, before), "the robot to follow the handle")
             moved = engine.forward_kinematics(viewer.view.q, frame)

@@ -18,7 +18,7 @@ from dynx.viewer import view
 from dynx.viewer.browser import HOVERED
 from dynx.viewer.marks import CORNERS, arranged, overlap, rectangle, seen_by
 from dynx.world import World, read_scene
-from tests.viewer.conftest import PICTURE, Opened, OpenPage, antialiased, connected, pixel_of, until
+from tests.viewer.conftest import Opened, OpenPage, antialiased, connected, until, wait_for_rest
 
 MESSAGE = 160.0
 """Height of the part of a page on which viser tells that software draws [pixels]."""
@@ -58,7 +58,7 @@ def name_beside(page: Opened, pixel: Floats, part: str) -> float:
     # A pointer that stays is asked nothing.
     for each in (pixel - 1.0, pixel):
         page.page.mouse.move(*each)
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page)
     assert label.text_content() == part
     box = label.bounding_box()
     assert box is not None, f"the name of {part} is not shown"
@@ -68,23 +68,27 @@ def name_beside(page: Opened, pixel: Floats, part: str) -> float:
 def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: OpenPage) -> None:
     with World(read_scene("stack")) as world, world.view() as viewer:
         page = open_page(viewer.url)
-        (client,) = connected(viewer)
-        pixels = {name: pixel_of(client, body.position) for name, body in world.state.bodies.items()}
+        connected(viewer)
+        wait_for_rest(page, viewer)
+        nodes = {name: viewer.view.drawn.parts[name].name for name in world.state.bodies}
+        # From the page: the camera that the server knows may be of an earlier picture.
+        pixels = {name: np.array(page.page.evaluate(PIXEL, node)) for name, node in nodes.items()}
         # Below the message on software, which lies over the upper left of the page.
         name, held = min(
             ((name, pixel) for name, pixel in pixels.items() if pixel[1] > MESSAGE),
             key=lambda each: each[1][1],
         )
         mouse = page.page.mouse
-        hover(page, viewer.view.drawn.parts[name].name, name)
+        hover(page, nodes[name], name)
         mouse.move(*held)
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page)
+        # Once, since a second click takes the name away.
         mouse.click(*held)
         until(lambda: viewer.view.names.shown == name, "the name of the part that was clicked")
         steps = [lambda x=x: mouse.move(held[0] + x, held[1]) for x in (30.0, 60.0)]
         for action in (mouse.down, *steps):
             action()
-            page.page.wait_for_timeout(PICTURE)
+            wait_for_rest(page)
 
         def pulled() -> Floats:
             found = viewer.view._spring.forces(world)
@@ -115,7 +119,6 @@ def test_the_name_of_the_part_under_the_pointer_is_shown(open_page: OpenPage, tm
         label = page.page.locator(f"#{HOVERED}")
         for part in ("base", name):
             hover(page, viewer.view.robot.links[part].name, part)
-            # From the page: the camera that the server knows may be of an earlier picture.
             pixel = np.array(page.page.evaluate(PIXEL, viewer.view.robot.links[part].name))
             before = name_beside(page, pixel, part)
             assert name_beside(page, pixel + 4.0, part) > before

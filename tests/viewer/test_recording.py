@@ -15,7 +15,7 @@ from dynx.model import Pose
 from dynx.viewer.export import MAX_PICTURES, PICTURES_PER_SECOND
 from dynx.viewer.recording import LONGEST, FilmRecorder
 from dynx.world import Scene, World, box, ground
-from tests.viewer.conftest import PICTURE, OpenPage, connected
+from tests.viewer.conftest import OpenPage, connected, wait_for_rest
 
 CUBE = box("cube", (0.4, 0.4, 0.4), mass=1.0, pose=Pose((0.0, 0.0, 1.0)))
 SCENE = Scene("yard", bodies=(ground(), CUBE))
@@ -108,7 +108,7 @@ def test_the_page_saves_pictures_and_films(open_page: OpenPage, tmp_path: Path) 
     with World(SCENE) as world, world.view(steps=False) as viewer:
         page = open_page(viewer.url, (700, 400))
         (client,) = connected(viewer)
-        page.page.wait_for_timeout(PICTURE)
+        wait_for_rest(page, viewer)
         with pytest.raises(ArgumentError, match="is that of the page: save picture"):
             viewer.on_key("c", print)
 
