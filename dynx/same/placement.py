@@ -14,15 +14,14 @@ from dynx.same.shapes import SHAPE_KINDS, matched_shapes
 
 
 def count_misplaced(found: Fit, tolerance: float) -> int:
-    """Count the shapes without an equal at the same place of the body, the frames that stand elsewhere, and
-    the constraints that hold other places; of a description that leaves constraints open there are none."""
+    """Count the shapes and frames that stand elsewhere in their bodies, and the constraints that hold other
+    places; of a description that leaves constraints open there are none."""
     ours, theirs = found.ours.model, found.theirs.model
     count = 0
     for each in found.bodies:
         for kind in SHAPE_KINDS:
             pair = found.ours, found.theirs, each.ours, each.theirs
-            matched = matched_shapes(kind, *pair, each.D, tolerance)
-            count += len(matched.first) + len(matched.second)
+            count += matched_shapes(kind, *pair, each.D, tolerance).count_misplaced()
     with fifty_digits():
         frames = frame_differences(ours, theirs, found, tolerance)
         constraints = equality_differences(ours, theirs, found, tolerance)

@@ -67,6 +67,14 @@ class MatchedShapes:
     first: list[ShapeOfBody]
     second: list[ShapeOfBody]
 
+    def count_misplaced(self) -> int:
+        """Count the shapes without an equal that the other description has elsewhere in the body."""
+        left = list(self.second)
+        for mine in self.first:
+            other = next((each for each in left if mine.is_as_large(each, ROUNDED)), None)
+            left = [each for each in left if each is not other]
+        return len(self.second) - len(left)
+
 
 def matched_shapes(
     kind: ShapeKind, ours: Skeleton, theirs: Skeleton, a: int, b: int, D: Array, tolerance: float
