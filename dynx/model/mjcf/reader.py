@@ -522,7 +522,9 @@ class _TreeReader:
             elif tag == "site":
                 body.sites.append((document.resolved(element, childclass), outer))
             elif tag == "joint":
-                body.joints.append((document.resolved(element, childclass), outer))
+                joint = document.resolved(element, childclass)
+                self._note_dynamics_of_free(joint)
+                body.joints.append((joint, outer))
             elif tag == "freejoint":
                 body.joints.append((element, outer))
             elif tag == "inertial":
@@ -577,6 +579,15 @@ class _TreeReader:
         return name
 
     # -- joints ---------------------------------------------------------------------------------
+
+    def _note_dynamics_of_free(self, joint: Element) -> None:
+        """Note that the damping, friction, armature and spring of a free joint do not act."""
+        names = ("damping", "frictionloss", "armature", "stiffness")
+        stated = [name for name in names if joint.attributes.get(name, "0").strip("0. ")]
+        if stated and self._joint_type(joint) == "free":
+            self._reading.note(
+                joint, f"{', '.join(stated)} of the free joint do not act: a floating base has none in dynx"
+            )
 
     def _join(self, body: _BodyContent, parent: str, placement: Floats) -> None:
         """Add the joints between a body and its parent, in which the body is at `placement` (4, 4).

@@ -125,3 +125,14 @@ def test_same_tells_springs_apart() -> None:
         report = same_robot(one, replace(one, joints=joints))
         assert {each.kind for each in report.attributes} == kinds
         assert report.same
+
+
+def test_damping_and_armature_of_a_free_joint_are_named() -> None:
+    """A joint of the type free takes the defaults of joints, and <freejoint> does not."""
+    text = """<mujoco><default><joint damping="5" armature="0.0"/></default><worldbody>
+    <body name="a">JOINT<geom size="0.1"/></body></worldbody></mujoco>"""
+    found = [
+        any("damping of the free joint do not act" in each.message for each in dynx.load(text).notes)
+        for text in (text.replace("JOINT", each) for each in ('<joint type="free"/>', "<freejoint/>"))
+    ]
+    assert found == [True, False]
