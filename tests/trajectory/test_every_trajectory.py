@@ -203,7 +203,7 @@ def test_engines_and_planners_are_imported_on_first_use() -> None:
 def test_modules_of_a_package_are_its_attributes() -> None:
     """Although the package imports none of them by itself."""
     program = (
-        "import dynx; dynx.world.scene.read_scene, dynx.world.camera, dynx.control.bullet, "
+        "import dynx; dynx.world.scene, dynx.world.camera, dynx.control.bullet, "
         "dynx.trajectory.waypoints, dynx.distance; assert not hasattr(dynx.world, 'weather')"
     )
     assert modules_after(program).isdisjoint(ENGINES)

@@ -237,6 +237,8 @@ def test_a_choice_reaches_the_program_and_everything_is_removed_at_once(open_pag
 
 def poses_in_page(page: Opened, paths: Mapping[str, str]) -> dict[str, Floats]:
     """Return the pose (4, 4) in the world of the page's nodes, by the names of the parts at these paths."""
+    placed = "paths => paths.every((path) => window.__viserMutable?.nodeRefFromName?.[path])"
+    page.page.wait_for_function(placed, arg=list(paths))
     found = page.page.evaluate(
         """paths => paths.map(path => {
           const nodes = __viserMutable.nodeRefFromName, root = nodes["/" + path.split("/")[1]], chain = [];
