@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-import numpy as np
-
 from dynx.model import Model
 from dynx.model.elements import Pose
 from dynx.model.stated_parts import NamedConfiguration
@@ -15,13 +13,11 @@ from dynx.same.decimals import rounded
 from dynx.same.fit import Fit
 from dynx.same.skeleton import kind_of
 from dynx.same.stated import counterparts
+from dynx.same.stated_poses import ball_rotation, base_pose, poses_differ, rotations_differ
 from dynx.same.text import pose_text, vector_text
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous, inverse
-from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
-
-ROTATION_ENTRIES = 4.0
-"""Difference of an entry of a rotation that counts, relative to the tolerance of an angle [rad]."""
+from dynx.spatial.se3 import inverse
+from dynx.spatial.so3 import quat_from_rotation
 
 
 class _Configuration(NamedTuple):
@@ -129,9 +125,9 @@ class _CommonCoordinates:
             _Configuration(
                 each.name,
                 {one: float(q[ours.position_index(one)]) for _, one, _ in joints},
-                {one: _rotation(ours, q, one) for _, one, _ in balls},
+                {one: ball_rotation(ours, q, one) for _, one, _ in balls},
                 {one or two: _position_text(ours, q, one) for two, one in other_kinds.items()},
-                _base(q) if ours.floating else None,
+                base_pose(q) if ours.floating else None,
                 each.line,
             )
             for each in ours.stated_configurations
@@ -141,9 +137,9 @@ class _CommonCoordinates:
             _Configuration(
                 each.name,
                 {one: fit.sign * float(q[theirs.position_index(two)]) for fit, one, two in joints},
-                {one: fit.turns[0] @ _rotation(theirs, q, two) @ fit.turns[1] for fit, one, two in balls},
+                {one: fit.turns[0] @ ball_rotation(theirs, q, two) @ fit.turns[1] for fit, one, two in balls},
                 {one or two: _position_text(theirs, q, two) for two, one in other_kinds.items()},
-                _base(q) @ inverse(D) if theirs.floating else None,
+                base_pose(q) @ inverse(D) if theirs.floating else None,
                 each.line,
             )
             for each in theirs.stated_configurations
@@ -163,11 +159,7 @@ class _CommonCoordinates:
                 for name, x in a.positions.items()
                 if abs(x - b.positions[name]) > tolerance * (self._reach if joint(name).unit == "m" else 1.0)
             ]
-            + [
-                name
-                for name, R in a.rotations.items()
-                if np.abs(R - b.rotations[name]).max() > ROTATION_ENTRIES * tolerance
-            ]
+            + [name for name, R in a.rotations.items() if rotations_differ(R, b.rotations[name], tolerance)]
             + list(a.others)
         )
 
@@ -175,18 +167,10 @@ class _CommonCoordinates:
         """Check whether the poses of floating bases differ."""
         if a.T_world_base is None or b.T_world_base is None:
             return False
-        size = self._reach + float(np.abs(a.T_world_base[:3, 3]).max())
-        off = np.abs(a.T_world_base - b.T_world_base)
-        turned = bool(off[:3, :3].max() > ROTATION_ENTRIES * self._tolerance)
-        return turned or bool(off[:3, 3].max() > self._tolerance * size)
+        return poses_differ(a.T_world_base, b.T_world_base, self._tolerance, self._reach)
 
     def _are_equal(self, a: _Configuration, b: _Configuration) -> bool:
         return not self.changed(a, b) and not self.base_differs(a, b)
-
-
-def _rotation(model: Model, q: Floats, ball: str) -> Floats:
-    first = model.position_index(ball)
-    return rotation_from_quat(q[first : first + 4])
 
 
 def _position_text(model: Model, q: Floats, name: str | None) -> str:
@@ -195,12 +179,8 @@ def _position_text(model: Model, q: Floats, name: str | None) -> str:
         return "fixed" if name is None or not model.joint(name).moves else "follows another joint"
     joint = model.joint(name)
     if joint.type == "ball":
-        return vector_text(quat_from_rotation(_rotation(model, q, name)), 9)
+        return vector_text(quat_from_rotation(ball_rotation(model, q, name)), 9)
     return f"{number_text(float(q[model.position_index(name)]))} {joint.unit}"
-
-
-def _base(q: Floats) -> Floats:
-    return homogeneous(rotation_from_quat(q[3:7]), q[:3])
 
 
 def _text(configuration: _Configuration, joints: list[str], base: bool) -> str:

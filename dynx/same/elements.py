@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import chain, combinations, islice
-from typing import Any, Literal, get_args
+from itertools import chain, combinations
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from dynx.same.scales import inertia_ratio
 from dynx.same.skeleton import (
     Skeleton,
     are_alike,
+    exact_skeleton,
     float_inertia,
     kind_of,
     subtract,
@@ -193,22 +194,23 @@ def _with_fixed_joints(
 ) -> Analysis:
     """Compare two models with some elements replaced; find fixed joints that explain what then differs."""
     changed = apply(theirs, (change for each in known for change in each.changes))
-    best = _analysed(ours, changed, known, tolerance)
+    best = _analysed(ours, exact_skeleton(changed), known, tolerance)
     tried: set[str] = {each.theirs for each in known}
     while len(best.elements) > len(known):
-        trials: list[tuple[Analysis, DifferingElement, Model]] = []
+        trials: list[tuple[Analysis, DifferingElement | None, Model]] = []
         # A base that itself differs may have a frame that was chosen for what is above the fixed joint.
         at_root = (
             best.fit.theirs.body_of[each.theirs] == ROOT for each in best.elements if each.tag == "link"
         )
         base = None if any(at_root) else rounded(best.fit.bodies[0].D)
         misplaced = _misplaced(best, tolerance)
-        joints = _fixed_joints(best, ours.model, tried, any_single=misplaced > 0)
+        candidates = _fixed_joints(best, ours.model, tried, any_single=misplaced > 0)
         if misplaced:
-            joints = chain(joints, _own_joints(best, tried))
-        for each in islice(joints, MAX_TRIALS):
-            placed = apply(changed, each.changes)
-            trials.append((_analysed(ours, placed, [*known, each], tolerance, base), each, placed))
+            candidates = chain(candidates, _own_joints(best, tried))
+        for each, other, frame in _promising(candidates, best.fit, changed, tolerance):
+            elements = known if each is None else [*known, each]
+            found_base = base if frame is None else frame
+            trials.append((_analysed(ours, other, elements, tolerance, found_base), each, other.model))
         found = min(trials, key=lambda trial: trial[0].cost, default=None)
         if found is None or round(found[0].cost - best.cost, 6) > 0.0:
             break
@@ -220,9 +222,45 @@ def _with_fixed_joints(
                 break
             found = equal[counts.index(min(counts))]
         best, element, changed = found
-        known = [*known, element]
-        tried.add(element.theirs)
+        if element is not None:
+            known = [*known, element]
+            tried.add(element.theirs)
     return best
+
+
+class _Candidate(NamedTuple):
+    """A place of a joint that may explain what differs, or with None another frame of a floating base. If it
+    explains no fewer elements, `expected` is how its body fits then: it is better only if more stands at its
+    place in that body."""
+
+    element: DifferingElement | None
+    expected: BodyFit | None
+
+
+def _promising(
+    candidates: Iterable[_Candidate], found: Fit, changed: Model, tolerance: float
+) -> Iterator[tuple[DifferingElement | None, Skeleton, Floats | None]]:
+    """Yield the candidates that may be a better explanation, `MAX_TRIALS` at most, with the robot that has
+    them, and with the frame (4, 4) of its floating base if that is the candidate."""
+    least = max(tolerance, MIN_TOLERANCE)
+    before: dict[int, int] = {}
+    count = 0
+    for element, expected in candidates:
+        if expected is not None:
+            body = expected.theirs
+            if body not in before:
+                before[body] = count_misplaced(found, least, body)
+            if not before[body]:
+                continue
+        theirs = found.theirs if element is None else exact_skeleton(apply(changed, element.changes))
+        if expected is not None:
+            bodies = tuple(expected if each.theirs == body else each for each in found.bodies)
+            if count_misplaced(replace(found, theirs=theirs, bodies=bodies), least, body) >= before[body]:
+                continue
+        yield element, theirs, rounded(expected.D) if element is None and expected is not None else None
+        count += 1
+        if count == MAX_TRIALS:
+            return
 
 
 def _misplaced(analysis: Analysis, tolerance: float) -> int:
@@ -234,13 +272,13 @@ def _misplaced(analysis: Analysis, tolerance: float) -> int:
 
 def _analysed(
     ours: Skeleton,
-    changed: Model,
+    other: Skeleton,
     known: list[DifferingElement],
     tolerance: float,
     base: Floats | None = None,
 ) -> Analysis:
+    changed = other.model
     with fifty_digits():
-        other = Skeleton(changed)
         found = fit(ours, other, Matching(ours, other, tolerance, base).find())
         joints = [*known, *_of_joints(found, tolerance)]
         inertials, unseen = _Inertias(found, tolerance).find()
@@ -253,7 +291,7 @@ def _analysed(
 
 def _fixed_joints(
     analysis: Analysis, ours: Model, tried: set[str], *, any_single: bool
-) -> Iterator[DifferingElement]:
+) -> Iterator[_Candidate]:
     """Yield fixed joints of `theirs`, in document order, below which elements differ, each placed so that the
     first joint or the first inertia of these does not.
 
@@ -261,6 +299,7 @@ def _fixed_joints(
     what else stands at its place decides.
     """
     found = analysis.fit
+    fits = {each.theirs: each for each in found.bodies}
     model = found.theirs.model
     above = {joint.child: joint for joint in model.joints}
     below: dict[str, list[DifferingElement]] = {}
@@ -275,18 +314,22 @@ def _fixed_joints(
             link = above[link].parent
     mine = {name: joint for name, joint in _named_counterparts(ours, model).items() if not joint.moves}
 
-    def placed(joint: Joint, elements: list[DifferingElement], beside: bool) -> Iterator[DifferingElement]:
+    def placed(
+        joint: Joint, elements: list[DifferingElement], *, beside: bool, single: bool
+    ) -> Iterator[_Candidate]:
+        here = fits[found.theirs.body_of[joint.child]]
         # The place of a joint says exactly where its parent is, whatever the frames of links.
         joints, links = ([each for each in elements if each.tag == tag] for tag in ("joint", "link"))
         for element in (*joints[:1], *links[:1]):
             with fifty_digits():
-                displacements = [*_displacements(found, joint, element)]
+                displacements = [*_displacements(found, here, element)]
+                frames = [here.D @ each if beside else here.D for each in displacements]
                 if beside:
                     displacements = [inverse(each) for each in displacements]
-            for displacement in displacements:
+            for displacement, D in zip(displacements, frames, strict=True):
                 other = _placed(found, mine.get(joint.name), joint, displacement)
                 if other is not None:
-                    yield other
+                    yield _Candidate(other, replace(here, D=D) if single else None)
 
     written_otherwise = [
         joint
@@ -305,38 +348,40 @@ def _fixed_joints(
                 continue
             with fifty_digits():
                 followed = _followed(found, body)
-                off = inverse(followed) @ next(each.D for each in found.bodies if each.theirs == body)
+                off = inverse(followed) @ fits[body].D
                 displacements = [off]
                 for element in below.get(joint.name, [])[:1]:
-                    displacements += _displacements(found, joint, element, followed)
+                    displacements += _displacements(found, replace(fits[body], D=followed), element)
             for displacement in displacements:
                 other = _placed(found, mine.get(joint.name), joint, displacement)
                 if other is not None:
-                    yield other
+                    yield _Candidate(other, None)
     for joint in [joint for joint in model.joints if joint.name in below and joint.name not in tried]:
         # What is written as in the other description is not at fault; what has no counterpart there may be
         # if several elements, or the place of a joint, depend on it.
         # A single element below it that is written otherwise is as good an explanation.
         elements = below[joint.name]
+        several = len(elements) > 1
         if joint.name in mine:
-            several = len(elements) > 1 or elements[0].unchanged or any_single
-            suspect = several and not are_alike(mine[joint.name].origin, joint.origin)
+            suspect = not are_alike(mine[joint.name].origin, joint.origin)
+            likely = several or elements[0].unchanged
         else:
-            suspect = elements[0].tag == "joint" or len(elements) > 1 or any_single
-        if suspect:
-            yield from placed(joint, elements, beside=False)
+            suspect = True
+            likely = several or elements[0].tag == "joint"
+        if suspect and (likely or any_single):
+            yield from placed(joint, elements, beside=False, single=not likely)
     # The frame of a body may be chosen for what is below a fixed joint: all else in the body differs then, as
     # may its own joint, or a floating base.
     several = sum(each.theirs not in tried for each in analysis.elements) > 1
     for joint in written_otherwise if several or any_single else []:
         elements = in_body.get(found.theirs.body_of[joint.child], [])
         if elements and joint.name not in below:
-            yield from placed(joint, elements, beside=True)
+            yield from placed(joint, elements, beside=True, single=not several)
 
 
-def _own_joints(analysis: Analysis, tried: set[str]) -> Iterator[DifferingElement]:
+def _own_joints(analysis: Analysis, tried: set[str]) -> Iterator[_Candidate]:
     """Yield the joints that move the bodies of which an inertia or the place of a joint differs, each placed
-    so that it does not."""
+    so that it does not; of a floating base its frame."""
     found = analysis.fit
     fits = {each.theirs: each for each in found.bodies}
     differing = {each.theirs for each in analysis.elements} | tried
@@ -349,20 +394,26 @@ def _own_joints(analysis: Analysis, tried: set[str]) -> Iterator[DifferingElemen
                 continue
             link = found.theirs.model.joint(link).parent
         body = found.theirs.body_of[link]
-        if body == ROOT or found.theirs.kinds[body] == "ball":
-            # What turns on a ball joint is turned as it fits best.
+        each = fits[body]
+        with fifty_digits():
+            frames = [each.D @ displacement for displacement in _displacements(found, each, element)]
+        if body == ROOT:
+            if found.theirs.model.floating:
+                yield from (_Candidate(None, replace(each, D=D)) for D in frames)
             continue
-        joint, each = found.theirs.joints[body], fits[body]
-        if joint.name in differing:
+        joint = found.theirs.joints[body]
+        # What turns on a ball joint is turned as it fits best.
+        if found.theirs.kinds[body] == "ball" or joint.name in differing:
             continue
         parent = fits[found.theirs.bodies[body].parent]
-        with fifty_digits():
-            for displacement in _displacements(found, joint, element):
-                D = each.D @ displacement
+        for D in frames:
+            with fifty_digits():
                 off = inverse(parent.D @ found.theirs.exact[body]) @ found.ours.exact[each.ours] @ D
                 turn, shift = angle_of(off), float(np.linalg.norm(rounded(off[:3, 3])))
-                if max(turn, shift / found.ours.reach) >= SNAP:
-                    yield _origin(found, replace(each, D=D, turn=turn, shift=shift), parent)
+                moved = replace(each, D=D, turn=turn, shift=shift)
+                placed = _origin(found, moved, parent)
+            if max(turn, shift / found.ours.reach) >= SNAP:
+                yield _Candidate(placed, moved)
 
 
 def _is_place_that_moves(model: Model, element: DifferingElement) -> bool:
@@ -377,16 +428,12 @@ def _followed(found: Fit, body: int) -> Array:
     return inverse(found.ours.exact[each.ours]) @ parent.D @ found.theirs.exact[body]
 
 
-def _displacements(
-    found: Fit, joint: Joint, element: DifferingElement, D: Array | None = None
-) -> Iterator[Array]:
-    """Yield the displacements (4, 4), in the body of a joint, that make another element below it right: of a
-    link both by its frame and by its inertia, in case its frame is moved. The frame of the body has the pose
-    D (4, 4), by default that of the fit."""
+def _displacements(found: Fit, here: BodyFit, element: DifferingElement) -> Iterator[Array]:
+    """Yield the displacements (4, 4), in a body whose fit is `here`, that make an element of it right: of a
+    link both by its frame and by its inertia, in case its frame is moved."""
     ours, theirs = found.ours, found.theirs
     fits = {each.theirs: each for each in found.bodies}
-    here = fits[theirs.body_of[joint.child]]
-    back = inverse(here.D if D is None else D)
+    back = inverse(here.D)
     if element.tag == "joint":
         each = fits[theirs.number[element.theirs]]
         yield back @ ours.exact[each.ours] @ each.D @ inverse(theirs.exact[each.theirs])

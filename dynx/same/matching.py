@@ -18,10 +18,11 @@ import numpy as np
 
 from dynx.model.mechanism import ROOT
 from dynx.same.limits import limit_differences
-from dynx.same.registration import candidates, candidates_of_other_pairings
+from dynx.same.registration import MAX_STATED, candidates, candidates_of_other_pairings
 from dynx.same.scales import extent, inertia_ratio
 from dynx.same.shapes import SHAPE_KINDS, matched_shapes
 from dynx.same.skeleton import Skeleton, are_alike, is_of_reader, subtract, transformed
+from dynx.same.stated_poses import StatedPoses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 from dynx.spatial.so3 import cross, rotation_about
@@ -126,6 +127,7 @@ class Matching:
         self.length = max(self.ours.reach, self.theirs.reach)
         self._digits = KEY_DIGITS - int(np.floor(np.log10(self.tolerance)))
         self._per_length = np.array([[1.0, 1.0, 1.0, 1.0 / self.length]] * 3)
+        self._stated = StatedPoses(self.ours, self.theirs)
 
     def find(self) -> MatchingPlan:
         """Return the best plan of the whole robots. The frame of a floating base may be anywhere in it."""
@@ -152,9 +154,9 @@ class Matching:
             if count == 0.0 and not self._has_same_total(D):
                 # Each body fits but for what may belong to its parent; the root has not got it.
                 count = HALF
-            # Of bases that explain as much, those in which more shapes are where they were.
-            shapes = self._misplaced_shapes(ROOT, ROOT, D) if count <= limit else 0
-            found = sorted([*found, (count, shapes, number, D)], key=_first_three)
+            # Of bases that explain as much, those in which more shapes and configurations are as they were.
+            others = self._misplaced(ROOT, ROOT, D) if count <= limit else 0
+            found = sorted([*found, (count, others, number, D)], key=_first_three)
             # The frame as it is stays in the choice, and the first in which the base itself fits: below a
             # misplaced joint all differs, in any frame.
             kept = [entry for entry in found[MAX_BASES:] if entry[2] == 0]
@@ -166,13 +168,13 @@ class Matching:
         if found[0][0] <= HALF or found[0][2] == 0:
             found = found[:1]
         best = self._chosen(ROOT, ROOT, found[0][3], 0.0)
-        shapes = self._misplaced_shapes(ROOT, ROOT, found[0][3]) if len(found) > 1 else 0
+        others = self._misplaced(ROOT, ROOT, found[0][3]) if len(found) > 1 else 0
         for _, _, _, D in found[1:]:
             bound = round(self._bound(ROOT, ROOT, D), 6), 0
-            if bound < best.rank or (bound == best.rank and shapes):
-                plan, other = self._chosen(ROOT, ROOT, D, 0.0), self._misplaced_shapes(ROOT, ROOT, D)
-                if (plan.rank, other) < (best.rank, shapes):
-                    best, shapes = plan, other
+            if bound < best.rank or (bound == best.rank and others):
+                plan, other = self._chosen(ROOT, ROOT, D, 0.0), self._misplaced(ROOT, ROOT, D)
+                if (plan.rank, other) < (best.rank, others):
+                    best, others = plan, other
         return best
 
     def _has_same_total(self, D: Floats) -> bool:
@@ -181,12 +183,18 @@ class Matching:
         whole = self.ours.whole
         return inertia_ratio(subtract(mine, transformed(other, D)), mine, whole) <= self.tolerance
 
-    def _misplaced_shapes(self, a: int, b: int, D: Floats) -> int:
-        """Count the shapes of two bodies with the frames D that have no equal."""
+    def _misplaced(self, a: int, b: int, D: Floats, followed: Floats | None = None) -> int:
+        """Count the shapes of two bodies with the frames D that have no equal, and the configurations in
+        which their floating bases or ball joints differ. Of a ball joint `followed` follows from the parent.
+        """
         found = [
             matched_shapes(kind, self.ours, self.theirs, a, b, D, self.tolerance) for kind in SHAPE_KINDS
         ]
-        return sum(len(each.first) + len(each.second) for each in found)
+        shapes = sum(len(each.first) + len(each.second) for each in found)
+        if followed is not None:
+            turns = followed[:3, :3], D[:3, :3]
+            return shapes + self._stated.count_turned_balls(a, b, *turns, self.tolerance)
+        return shapes + self._stated.count_misplaced_bases(D, self.tolerance)
 
     def _bound(self, a: int, b: int, D: Floats) -> float:
         """Return a lower bound on the cost of two bodies with the frames D: a child that fits none of the
@@ -269,23 +277,32 @@ class Matching:
         for p, extra in places:
             found: list[tuple[float, int, int, Floats]] = []
             at = homogeneous(followed[:3, :3], p)
-            for number, D in enumerate(self._free_frames(a, b, at)):
+            stated = islice(self._stated.turns_of_ball(a, b, followed[:3, :3]), MAX_STATED)
+            frames = chain(self._free_frames(a, b, at), (homogeneous(R, p) for R in stated))
+            for number, D in enumerate(frames):
                 limit = found[MAX_BASES - 1][0] if len(found) >= MAX_BASES else np.inf
                 count = self._followed(a, b, D, limit + HALF)
-                # Of frames that explain as much, those in which more shapes are where they were.
-                shapes = self._misplaced_shapes(a, b, D) if count <= limit else 0
-                found = sorted([*found, (count, shapes, number, D)], key=_first_three)[:MAX_BASES]
+                # Of frames that explain as much, those in which more shapes and configurations are as they
+                # were.
+                fits = self._own_cost(a, b, D) == 0.0
+                others = self._misplaced(a, b, D, followed) if fits or count <= limit else 0
+                found = sorted([*found, (count, others, number, D)], key=_first_three)
+                # The first of these in which the body itself fits stays in the choice: below a misplaced
+                # joint all differs.
+                fitting = (entry for entry in found[MAX_BASES:] if entry[1] < found[0][1])
+                fitting = (entry for entry in fitting if self._own_cost(a, b, entry[3]) == 0.0)
+                found = [*found[:MAX_BASES], *islice(fitting, 1)]
                 if found[0][:2] == (0.0, 0):
                     break
-            for count, shapes, number, D in found:
+            for count, others, number, D in found:
                 if best is not None and len(self._plans) > MAX_PLANS:
                     break
                 if number == 0 and extra == 0.0:
                     plan = self._subtree(a, b, D)
                 else:
                     plan = self._chosen(a, b, D, extra)
-                if best is None or (plan.rank, shapes) < best[:2]:
-                    best = plan.rank, shapes, plan
+                if best is None or (plan.rank, others) < best[:2]:
+                    best = plan.rank, others, plan
                 if count == 0.0:
                     break
         assert best is not None

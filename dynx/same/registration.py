@@ -17,6 +17,7 @@ from dynx.same.arrangement import arrangements
 from dynx.same.decimals import rounded
 from dynx.same.shapes import SHAPE_KINDS, frames_of_shapes
 from dynx.same.skeleton import Skeleton
+from dynx.same.stated_poses import StatedPoses
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
@@ -33,6 +34,9 @@ MAX_LINES = 4
 
 MAX_PAIRINGS = 24
 """Largest number of ways to pair the bodies of two robots that are tried."""
+
+MAX_STATED = 4
+"""Largest number of configurations from which a frame of a floating base or of a ball joint is derived."""
 
 MAX_LIKE_JOINTS = 4
 """Largest number of like joints of one body of which all orders are tried."""
@@ -177,7 +181,8 @@ def _own_candidates(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterato
 
 def _candidates_of_links(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterator[Floats]:
     """Yield the frames of which a link of one name, with mass or a shape, is where it is in the other robot:
-    where a link of the body is misplaced, that of another one is right."""
+    where a link of the body is misplaced, that of another one is right. Then those in which a floating base
+    is where it is in a configuration of one name."""
     mine, others = ours.heavy_links[a], theirs.heavy_links[b]
     if len(mine) > 1:
         for name in (each for each in mine if each in others):
@@ -187,6 +192,8 @@ def _candidates_of_links(ours: Skeleton, theirs: Skeleton, a: int, b: int) -> It
                 yield from (frame @ inverse(each) for each in principal_frames(inertias[1])[0])
     for kind in SHAPE_KINDS:
         yield from frames_of_shapes(kind, ours, theirs, a, b)
+    if a == ROOT and ours.model.floating and theirs.model.floating:
+        yield from islice(StatedPoses(ours, theirs).frames_of_base(), MAX_STATED)
 
 
 def _frames(skeleton: Skeleton, body: int, inertia: RigidInertia) -> Iterator[list[Floats]]:

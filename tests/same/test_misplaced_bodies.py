@@ -2,6 +2,7 @@
 
 Where the frame of a link is moved too, its inertia is written otherwise, and another inertia of that link
 explains the dynamics as well. The shapes of the link say that it is the link which stands elsewhere.
+Keyframes say so of a floating base and of a link on a ball joint, and a frame says so of its link.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ from hypothesis import strategies as st
 from dynx.model import Model
 from dynx.model.elements import Joint, JointType, Limits, Link, Pose
 from dynx.same import same_robot
+from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
-from dynx.spatial.so3 import quat_from_rotation
+from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
 from tests.same.planted import with_joint
-from tests.same.rewrites import random_rotation, with_moved_frames
+from tests.same.rewrites import random_rotation, rebuilt, with_moved_frames
 from tests.same.test_named_elements import above, names, picked, random_inertial
 
 QUICK = settings(
@@ -105,3 +107,88 @@ def test_a_misplaced_joint_is_named_where_frames_are_moved_and_shapes_move_along
     assert report.attributes == ()
     assert report.mended is not None
     assert same_robot(model, report.mended).same
+
+
+def chain(rng: np.random.Generator, kinds: tuple[JointType, ...], floating: bool) -> Model:
+    """Return a chain of links with mass on joints of some types."""
+    links, joints = [Link("link_0", random_inertial(rng))], []
+    for k, kind in enumerate(kinds, start=1):
+        axis = rng.standard_normal(3)
+        x, y, z = (axis / np.linalg.norm(axis)).tolist()
+        place = Pose.from_matrix(homogeneous(random_rotation(rng), rng.uniform(-0.4, 0.4, 3)))
+        limits = Limits() if kind == "ball" else Limits(-1.0, 1.0, 5.0, 9.0)
+        joints.append(Joint(f"joint_{k}", kind, f"link_{k - 1}", f"link_{k}", place, (x, y, z), limits))
+        links.append(Link(f"link_{k}", random_inertial(rng)))
+    return Model.build("chain", links, joints, base="floating" if floating else "fixed")
+
+
+def frame_of(model: Model, before: Model, link: str) -> Floats:
+    """Return the pose (4, 4) of the frame of a link in the one that it had before, with the same inertia."""
+    return before.inertial(link).origin.matrix @ inverse(model.inertial(link).origin.matrix)
+
+
+def with_keyframe(model: Model, before: Model, q: Floats) -> Model:
+    """Return a model with other frames, with the configuration q (nq,) of the model before."""
+    q = q.copy()
+    if model.floating:
+        T = homogeneous(rotation_from_quat(q[3:7]), q[:3]) @ frame_of(model, before, model.root)
+        q[:3], q[3:7] = T[:3, 3], quat_from_rotation(T[:3, :3])
+    for joint in before.ball_joints:
+        R, first = frame_of(model, before, joint.child)[:3, :3], before.position_index(joint.name)
+        turned = R.T @ rotation_from_quat(q[first : first + 4]) @ R
+        q[first : first + 4] = quat_from_rotation(turned)
+    return model.with_configuration("home", q)
+
+
+@QUICK
+@given(SEEDS, SIZES, st.sampled_from(["revolute", "prismatic", "ball"]), st.booleans())
+def test_keyframes_tell_that_a_joint_at_a_floating_base_is_misplaced(
+    seed: int, size: float, kind: JointType, moved: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    model = chain(rng, (kind, "revolute", "revolute"), floating=True)
+    other = with_joint(model, moved_or_turned(model.joint("joint_1"), size, rng))
+    if moved:
+        other = with_moved_frames(other, rng)
+    q = model.random(rng)
+    report = same_robot(with_keyframe(model, model, q).to_mjcf(), with_keyframe(other, model, q).to_mjcf())
+    assert names(report) == [("origin", "joint_1", "joint_1")]
+    assert report.attributes == ()
+
+
+@QUICK
+@given(SEEDS, SIZES, st.booleans())
+def test_keyframes_tell_that_a_joint_below_a_ball_joint_is_misplaced(
+    seed: int, size: float, floating: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    model = chain(rng, ("revolute", "ball", "revolute", "revolute"), floating)
+    joint = model.joint("joint_3")
+    # About the centre of the ball joint, as its link may be turned instead.
+    direction = rng.standard_normal(3)
+    turn = Pose((0.0, 0.0, 0.0), tuple((size * direction / np.linalg.norm(direction)).tolist())).matrix
+    misplaced = replace(joint, origin=Pose.from_matrix(turn @ joint.origin.matrix))
+    other = with_moved_frames(with_joint(model, misplaced), rng)
+    q = model.random(rng)
+    report = same_robot(with_keyframe(model, model, q).to_mjcf(), with_keyframe(other, model, q).to_mjcf())
+    assert names(report) == [("origin", "joint_3", "joint_3")]
+    assert report.attributes == ()
+
+
+@QUICK
+@given(SEEDS, SIZES, st.sampled_from(["revolute", "prismatic"]))
+def test_a_frame_tells_that_a_joint_at_a_floating_base_is_misplaced(
+    seed: int, size: float, kind: JointType
+) -> None:
+    rng = np.random.default_rng(seed)
+    model = chain(rng, (kind, "revolute", "revolute"), floating=True)
+    other = with_moved_frames(with_joint(model, moved_or_turned(model.joint("joint_1"), size, rng)), rng)
+    T = homogeneous(random_rotation(rng), rng.uniform(-0.4, 0.4, 3))
+    texts = []
+    for each in (model, other):
+        place = Pose.from_matrix(inverse(frame_of(each, model, "link_0")) @ T)
+        camera = Joint("to_camera", "fixed", "link_0", "camera", place)
+        texts.append(rebuilt(each, [*each.links, Link("camera")], [*each.joints, camera]).to_urdf())
+    report = same_robot(*texts, base="floating")
+    assert names(report) == [("origin", "joint_1", "joint_1")]
+    assert report.attributes == ()
