@@ -99,6 +99,28 @@ class MatchingPlan:
         return round(self.cost, 6), self.opposite
 
 
+class _Distinct:
+    """Arrays of an iterator, each once, however often they are iterated."""
+
+    def __init__(self, source: Iterator[Floats]) -> None:
+        self._source = source
+        self._found: list[Floats] = []
+
+    def __iter__(self) -> Iterator[Floats]:
+        number = 0
+        while number < len(self._found) or self._find():
+            yield self._found[number]
+            number += 1
+
+    def _find(self) -> bool:
+        """Find one more; False if there is none."""
+        for each in self._source:
+            if not any(float(np.max(np.abs(each - other))) < SAME_FRAME for other in self._found):
+                self._found.append(each)
+                return True
+        return False
+
+
 @dataclass
 class Matching:
     """Search for the plan with the fewest differing elements."""
@@ -119,8 +141,9 @@ class Matching:
     _own_costs: dict[Key, float] = field(default_factory=dict)
     _unmoved: dict[tuple[int, int], bool] = field(default_factory=dict)
     _turned_fits: dict[tuple[int, int], bool] = field(default_factory=dict)
-    _exhausted: set[tuple[int, int]] = field(default_factory=set)
-    _candidates: dict[tuple[int, int], list[Floats]] = field(default_factory=dict)
+    _candidates: dict[tuple[int, int], _Distinct] = field(default_factory=dict)
+    _turns: dict[tuple[int, int], _Distinct] = field(default_factory=dict)
+    _misplaced_counts: dict[Key, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.tolerance = max(self.tolerance, MIN_TOLERANCE)
@@ -170,10 +193,10 @@ class Matching:
         best = self._chosen(ROOT, ROOT, found[0][3], 0.0)
         others = self._misplaced(ROOT, ROOT, found[0][3]) if len(found) > 1 else 0
         for _, _, _, D in found[1:]:
-            bound = round(self._bound(ROOT, ROOT, D), 6), 0
-            if bound < best.rank or (bound == best.rank and others):
+            bound = round(self._bound(ROOT, ROOT, D), 6)
+            if (bound, 0, 0) < _preference(best, others):
                 plan, other = self._chosen(ROOT, ROOT, D, 0.0), self._misplaced(ROOT, ROOT, D)
-                if (plan.rank, other) < (best.rank, others):
+                if _preference(plan, other) < _preference(best, others):
                     best, others = plan, other
         return best
 
@@ -187,14 +210,27 @@ class Matching:
         """Count the shapes of two bodies with the frames D that have no equal, and the configurations in
         which their floating bases or ball joints differ. Of a ball joint `followed` follows from the parent.
         """
-        found = [
-            matched_shapes(kind, self.ours, self.theirs, a, b, D, self.tolerance) for kind in SHAPE_KINDS
-        ]
-        shapes = sum(len(each.first) + len(each.second) for each in found)
-        if followed is not None:
-            turns = followed[:3, :3], D[:3, :3]
-            return shapes + self._stated.count_turned_balls(a, b, *turns, self.tolerance)
-        return shapes + self._stated.count_misplaced_bases(D, self.tolerance)
+        shapes = self._misplaced_shapes(a, b, D)
+        if followed is None:
+            return shapes + self._stated.count_misplaced_bases(D, self.tolerance)
+        if not self.ours.heavy_links[a]:
+            # A link without mass between two joints has no shapes; that on the other joint has.
+            for i, j in self._by_name(a, b, D):
+                at = inverse(self.ours.placements[i]) @ D @ self.theirs.placements[j]
+                shapes += self._misplaced_shapes(i, j, at)
+        turns = followed[:3, :3], D[:3, :3]
+        return shapes + self._stated.count_turned_balls(a, b, *turns, self.tolerance)
+
+    def _misplaced_shapes(self, a: int, b: int, D: Floats) -> int:
+        """Count the shapes of two bodies with the frames D that have no equal."""
+        key = self._key(a, b, D)
+        count = self._misplaced_counts.get(key)
+        if count is None:
+            found = (
+                matched_shapes(kind, self.ours, self.theirs, a, b, D, self.tolerance) for kind in SHAPE_KINDS
+            )
+            count = self._misplaced_counts[key] = sum(len(each.first) + len(each.second) for each in found)
+        return count
 
     def _bound(self, a: int, b: int, D: Floats) -> float:
         """Return a lower bound on the cost of two bodies with the frames D: a child that fits none of the
@@ -258,14 +294,12 @@ class Matching:
             if float(np.max(np.abs(D - followed[:3, :3]))) > SAME_FRAME:
                 yield homogeneous(D, followed[:3, 3])
 
-    def _turns_of(self, a: int, b: int) -> Iterator[Floats]:
-        """Yield each rotation (3, 3) of the candidates once."""
-        found: list[Floats] = []
-        for D in self._candidates_of(a, b):
-            R = D[:3, :3]
-            if not any(float(np.max(np.abs(R - each))) < SAME_FRAME for each in found):
-                found.append(R)
-                yield R
+    def _turns_of(self, a: int, b: int) -> _Distinct:
+        """Return the rotations (3, 3) of the candidates, each once."""
+        found = self._turns.get((a, b))
+        if found is None:
+            found = self._turns[a, b] = _Distinct(D[:3, :3] for D in self._candidates_of(a, b))
+        return found
 
     def _turned(self, a: int, b: int, followed: Floats) -> MatchingPlan:
         """Return the best plan of two bodies on ball joints: their frames may be turned about the centre, and
@@ -273,7 +307,7 @@ class Matching:
         places = [(followed[:3, 3], 0.0)]
         if float(np.linalg.norm(followed[:3, 3])) > self.tolerance * self.length:
             places.append((np.zeros(3), _cost(self._has_equal_origins(a, b))))
-        best: tuple[tuple[float, int], int, MatchingPlan] | None = None
+        best: tuple[MatchingPlan, int] | None = None
         for p, extra in places:
             found: list[tuple[float, int, int, Floats]] = []
             at = homogeneous(followed[:3, :3], p)
@@ -301,12 +335,12 @@ class Matching:
                     plan = self._subtree(a, b, D)
                 else:
                     plan = self._chosen(a, b, D, extra)
-                if best is None or (plan.rank, others) < best[:2]:
-                    best = plan.rank, others, plan
+                if best is None or _preference(plan, others) < _preference(*best):
+                    best = plan, others
                 if count == 0.0:
                     break
         assert best is not None
-        return best[2]
+        return best[0]
 
     def _chosen(self, a: int, b: int, D: Floats, extra: float) -> MatchingPlan:
         plan = self._subtree(a, b, D)
@@ -404,20 +438,14 @@ class Matching:
                 p = axis * float(axis @ at) if self.ours.kinds[a] == "revolute" else at
             yield homogeneous(R, p)
 
-    def _candidates_of(self, a: int, b: int) -> Iterator[Floats]:
-        """Yield each candidate once."""
-        found = self._candidates.setdefault((a, b), [])
-        yield from found
-        if (a, b) in self._exhausted:
-            return
-        for D in chain(
-            islice(candidates(self.ours, self.theirs, a, b), MAX_CANDIDATES),
-            candidates_of_other_pairings(self.ours, self.theirs, a, b),
-        ):
-            if not any(float(np.max(np.abs(D - each))) < 1e-12 for each in found):
-                found.append(D)
-                yield D
-        self._exhausted.add((a, b))
+    def _candidates_of(self, a: int, b: int) -> _Distinct:
+        """Return the candidates, each once."""
+        found = self._candidates.get((a, b))
+        if found is None:
+            first = islice(candidates(self.ours, self.theirs, a, b), MAX_CANDIDATES)
+            others = candidates_of_other_pairings(self.ours, self.theirs, a, b)
+            found = self._candidates[a, b] = _Distinct(chain(first, others))
+        return found
 
     def _subtree(self, a: int, b: int, D: Floats) -> MatchingPlan:
         """Return the best plan of two bodies with the frames D, and of all below them."""
@@ -714,6 +742,13 @@ def _first_two(entry: tuple[Any, ...]) -> tuple[float, int]:
 
 def _first_three(entry: tuple[Any, ...]) -> tuple[float, int, int]:
     return entry[0], entry[1], entry[2]
+
+
+def _preference(plan: MatchingPlan, misplaced: int) -> tuple[float, int, int]:
+    """Return the order of preference of plans with other frames of a free body, the lowest first: fewer
+    elements, then less that is misplaced, then fewer opposite axes."""
+    cost, opposite = plan.rank
+    return cost, misplaced, opposite
 
 
 def _is_identity(T: Floats) -> bool:
