@@ -46,7 +46,7 @@ TENDON_SOFTNESS = frozenset(["margin", "solimpfriction", "solimplimit", "solreff
 """Attributes of a tendon for MuJoCo's constraint solver."""
 _OF_TENDON = TENDON_FORCES | TENDON_SOFTNESS | {"group", "user"}
 ATTRIBUTES: dict[str, frozenset[str]] = {
-    "body": _POSE | {"name", "childclass", "mocap", "gravcomp", "user", "sleep"},
+    "body": _POSE | {"name", "childclass", "mocap", "gravcomp", "user", "sleep", "fuse", "simple"},
     "frame": _POSE | {"name", "childclass"},
     "key": frozenset(["name", "time", "qpos", "qvel", "act", "ctrl", "mpos", "mquat", "plastic"]),
     "inertial": _POSE | {"mass", "diaginertia", "fullinertia"},

@@ -41,7 +41,7 @@ NOT_USED: Mapping[str, Mapping[str, str]] = {
         _NO_EFFECT: "emission metallic reflectance roughness shininess specular texrepeat texuniform"
     },
     "layer": {_NO_EFFECT: "role texture"},
-    "body": {_NO_EFFECT: "sleep user"},
+    "body": {_NO_EFFECT: "fuse simple sleep user"},
     "joint": {
         _SOLVER: "margin solimpfriction solimplimit solreffriction solreflimit",
         "gravity compensation does not go through actuators": "actuatorgravcomp",

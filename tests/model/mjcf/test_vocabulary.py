@@ -11,6 +11,7 @@ import pytest
 
 import dynx
 from dynx.errors import DynxError
+from dynx.model.mjcf.document import ATTRIBUTES
 from dynx.model.mjcf.options import _MEDIUM, _SETTINGS
 from dynx.model.mjcf.vocabulary import NOT_USED, OF_ACTUATORS, OF_SENSORS, SECTIONS_WITHOUT_ROBOT
 
@@ -154,6 +155,15 @@ def test_each_attribute_of_the_schema_is_used_or_listed(path: str) -> None:
     assert [*elements(path)], "the sample has no such element"
     attributes = (name for of, name in schema() if of == path and name not in NAMES)
     assert [name for name in attributes if not is_listed(path, name) and not is_read(path, name)] == []
+
+
+def test_no_attribute_of_the_schema_is_refused_as_unknown() -> None:
+    unknown = set()
+    for path, name in schema():
+        section, tag = path.split("/")[0], path.split("/")[-1].replace("(world)body", "body")
+        if section in ("compiler", "default", "(world)body", "keyframe") and tag in ATTRIBUTES:
+            unknown |= {(tag, name)} - {(tag, known) for known in ATTRIBUTES[tag]}
+    assert unknown == set()
 
 
 LOOKS = ("size", "statistic", "global", "quality", "headlight", "map", "scale", "rgba", "worldbody")
