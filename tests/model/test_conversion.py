@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from dynx.model.geometry import (
     Box,
     Capsule,
     Collision,
+    Cylinder,
     Ellipsoid,
     Geometry,
     LinkGeometry,
@@ -196,6 +197,31 @@ def test_shapes_that_differ_are_named(tmp_path: Path) -> None:
         assert "'b'" in found
     (missing,) = shape_differences(model, arm(LinkGeometry((), (Collision(Sphere(1.0)),))))
     assert "0 of 1 visual shapes" in missing
+
+
+def test_each_size_of_a_shape_that_differs_is_named() -> None:
+    shapes = (
+        Box((1.0, 2.0, 3.0)),
+        Sphere(1.0),
+        Cylinder(1.0, 2.0),
+        Capsule(1.0, 2.0),
+        Ellipsoid((1.0, 2.0, 3.0)),
+    )
+    for shape in shapes:
+        model = arm(LinkGeometry((), (Collision(shape),)))
+        others = []
+        for field in fields(shape):
+            value = getattr(shape, field.name)
+            changed: list[object]
+            if isinstance(value, tuple):
+                changed = [(*value[:k], value[k] * (1.0 + 1e-9), *value[k + 1 :]) for k in range(len(value))]
+            else:
+                changed = [value * (1.0 + 1e-9)]
+            others += [replace(shape, **{field.name: each}) for each in changed]  # type: ignore[arg-type]
+        for other in others:
+            assert list(shape_differences(model, arm(LinkGeometry((), (Collision(other),))))) == [
+                "the size of number 1 of the collision shapes of link 'b' differs"
+            ]
 
 
 def test_missing_meshes_are_named_and_the_rest_is_written(tmp_path: Path) -> None:

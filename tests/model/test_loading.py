@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,10 @@ from dynx.errors import (
     RobotNotFoundError,
     UnknownNameError,
 )
+from dynx.model import Link, Note
 from dynx.model.library import find
-from dynx.model.loading import load
+from dynx.model.loading import build_described, load
+from dynx.model.tree import Description
 from tests.conftest import needs_examples
 from tests.model.descriptions import joint, robot
 
@@ -216,3 +219,15 @@ def test_a_misspelt_option_gets_the_nearest_name() -> None:
     wrong: dict[str, Any] = {"bse": "floating"}
     with pytest.raises(UnknownNameError, match=r"load has no option 'bse'; did you mean 'base'\?"):
         dynx.load("pendulum", **wrong)
+
+
+def test_parts_that_form_no_tree_are_blamed_on_an_element_only_if_one_was_left_out() -> None:
+    parts = Description("pair", [Link("a"), Link("b")], [], [], [])
+    with pytest.raises(DescriptionError, match="root") as caught:
+        build_described(parts, "pair.xml")
+    plain = caught.value.message
+    left_out = Note("<group> was ignored", 7)
+    with pytest.raises(DescriptionError) as caught:
+        build_described(replace(parts, unread=left_out), "pair.xml")
+    assert caught.value.message == f"<group> was ignored (read without it: {plain})"
+    assert caught.value.line == 7

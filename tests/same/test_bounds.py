@@ -147,6 +147,28 @@ def test_bounds_of_a_mimic_joint_follow_from_the_travel_of_its_driver(kind: Join
     assert least >= 2.0 * 0.99e-8
 
 
+def crane(r: float, mass: float) -> Model:
+    """Make a robot with a body on the second of two vertical axes at the distance `r`."""
+    links = [Link("base"), Link("arm"), Link("hand", Inertial(mass, ixx=0.1, iyy=0.1, izz=0.1))]
+    joints = [
+        Joint("turn", "continuous", "base", "arm", Pose(), (0.0, 0.0, 1.0)),
+        Joint("wrist", "continuous", "arm", "hand", Pose((r, 0.0, 0.0)), (0.0, 0.0, 1.0)),
+    ]
+    return Model.build("crane", links, joints)
+
+
+@pytest.mark.parametrize("length", [10.0, 1e3])
+def test_bounds_of_a_long_arm_contain_the_change_of_its_moment_of_inertia(length: float) -> None:
+    """The moment of inertia m r^2 about the root changes by 2 m r e where the arm is longer by e."""
+    mass, e = 3.0, 1e-7 * length
+    limits = same_robot(crane(length, mass), crane(length + e, mass), tolerance=1e-5).bounds
+    assert limits is not None
+    assert limits.position >= 0.999 * e
+    assert limits.mass_matrix >= 0.999 * 2.0 * mass * length * e
+    # At 1 rad/s^2 about the root, the moment of inertia is the torque.
+    assert limits.torque >= 0.999 * 2.0 * mass * length * e
+
+
 def test_bounds_are_infinite_where_a_difference_grows_with_an_unlimited_position() -> None:
     own = Limits(-0.02, 0.02, 1.0, 1.0)
     pair = [follower("prismatic", each, own, Limits()) for each in (0.01, 0.01 + 1e-8)]

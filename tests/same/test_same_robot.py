@@ -426,6 +426,27 @@ def test_the_frame_of_a_link_with_mass_is_a_freedom_and_of_a_place_a_difference(
     assert "place" in [each.theirs for each in report.attributes if each.kind == "frame"]
 
 
+@pytest.mark.parametrize("kind", ["visual", "collision"])
+def test_the_frame_of_a_link_without_mass_is_a_freedom_where_its_shapes_stay(kind: str) -> None:
+    text = f"""<robot name="r"><link name="rail"/>
+        <link name="cart"><inertial><mass value="1"/>
+        <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+        <link name="sign"><{kind}><origin xyz="AT 0 0"/>
+        <geometry><sphere radius="0.1"/></geometry></{kind}></link>
+        <joint name="slide" type="prismatic"><parent link="rail"/><child link="cart"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+        <joint name="held" type="fixed"><parent link="cart"/><child link="sign"/>
+        <origin xyz="FROM 0 0"/></joint></robot>"""
+
+    def robot(held: float, shape: float) -> str:
+        return text.replace("FROM", repr(held)).replace("AT", repr(shape))
+
+    report = same_robot(robot(0.5, 0.0), robot(0.25, 0.25))
+    assert report.same
+    assert report.attributes == ()
+    assert [(each.kind, each.theirs) for each in report.freedoms] == [("frame", "sign")]
+
+
 def test_another_name_of_a_link_that_a_fixed_joint_holds_is_listed() -> None:
     text = Path(find("allegro_left_hand")).read_text(encoding="utf-8")
     report = same_robot(text, text.replace('"link_15.0_tip"', '"thumb"'))

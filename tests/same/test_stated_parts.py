@@ -175,3 +175,12 @@ def test_a_part_of_a_file_that_is_included_is_named_in_a_note(tmp_path: Path) ->
     report = same_robot(robot(tendon()), tmp_path / "robot.xml")
     assert report.mended_text is None
     assert any("tendon t is not mended" in each for each in report.notes)
+
+
+def test_notes_on_parts_that_are_not_mended_leave_those_on_the_texts(tmp_path: Path) -> None:
+    text = robot('<include file="parts.xml"/>')
+    (tmp_path / "parts.xml").write_text(f"<mujoco>{tendon(3.0)}</mujoco>")
+    (tmp_path / "robot.xml").write_text(text.replace("<joint ", '<joint margin="0.1" ', 1))
+    report = same_robot(robot(tendon()), tmp_path / "robot.xml")
+    for words in ("tendon t is not mended", "not read of <joint>: margin"):
+        assert any(words in each for each in report.notes)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.model import Link, Model
-from dynx.model.geometry import Appearance, Box, Geometry, LinkGeometry, Mesh, Visual
+from dynx.model.geometry import Appearance, Box, Collision, Geometry, LinkGeometry, Mesh, Visual
 from dynx.model.geometry.drawn_shapes import coloured_shapes, link_shapes
 from dynx.model.geometry.links import Colour
 from dynx.spatial.scalar import Floats
@@ -64,6 +64,23 @@ def test_each_triangle_of_an_obj_file_has_the_colour_of_its_material(
         found = colours_by_height(mesh)
         assert found == {height: given_colours[number] for height, number in enumerate(uses)}
         assert sum(len(part.triangles[1]) for part, _ in mesh.parts) == len(mesh.triangles[1])
+
+
+@given(SHARES, SHARES)
+def test_the_opacity_of_a_material_is_given_or_what_its_transparency_leaves(one: float, other: float) -> None:
+    clear = 1.0 - one
+    with TemporaryDirectory() as folder:
+        lines = {
+            f"d {one!r}": one,
+            f"Tr {clear!r}": 1.0 - clear,
+            f"Tr {other!r}\nd {one!r}": one,
+            "Tr 0.25 0.5 0.75": 0.75,
+        }
+        library = [f"newmtl colour {k}\nKd 1 0 0\n{line}" for k, line in enumerate(lines)]
+        (Path(folder) / "colours.mtl").write_text("\n".join([*library, ""]))
+        (Path(folder) / "mesh.obj").write_text(obj_in_colours([*range(len(lines))]))
+        found = colours_by_height(Mesh(str(Path(folder) / "mesh.obj")))
+        assert found == {k: (1.0, 0.0, 0.0, alpha) for k, alpha in enumerate(lines.values())}
 
 
 @pytest.mark.parametrize("library", ["absent.mtl", "../outside.mtl", "/etc/hostname", "damaged.mtl"])
@@ -186,6 +203,15 @@ def test_the_colour_of_a_visual_comes_before_those_of_its_mesh(tmp_path: Path) -
     assert [(shape, rgba) for shape, rgba, _ in drawn] == [(tiles, green)]
     named = list(coloured_shapes(Visual(tiles, material=Appearance("named")), None, green))
     assert {rgba[:3] for _, rgba, _ in named} == {RED, BLUE}
+
+
+def test_shapes_without_a_colour_are_grey() -> None:
+    box = Box((0.1, 0.1, 0.1))
+    geometry = Geometry({"seen": LinkGeometry((Visual(box),)), "felt": LinkGeometry((), (Collision(box),))})
+    colours = {colour for link in geometry.links for _, colour, _ in link_shapes(geometry, link)}
+    ((red, green, blue, alpha),) = colours
+    assert 0.0 < red == green == blue < 1.0
+    assert alpha == 1.0
 
 
 def test_the_page_draws_a_node_for_each_colour(tmp_path: Path) -> None:

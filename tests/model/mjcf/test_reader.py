@@ -440,6 +440,7 @@ def test_faults_of_bodies_that_are_no_part_of_a_free_robot_are_errors(inside: st
 def test_a_frame_that_mujoco_would_move_is_named(flag: str, joint: str, noted: bool) -> None:
     body = f'<body name="b"><freejoint{joint}/><geom size="0.1" pos="1 0 0"/></body>'
     model = dynx.load(f"<mujoco><compiler{flag}/><worldbody>{body}</worldbody></mujoco>")
+    assert any("align: the frame of body 'b'" in note.message for note in model.notes) == noted
     assert any("align" in note.message for note in model.notes) == noted
 
 

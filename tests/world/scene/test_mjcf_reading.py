@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import combinations
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -447,6 +448,20 @@ def test_a_keyframe_is_the_start_by_its_name() -> None:
     assert ball.pose.xyz == (1.0, 2.0, 4.0)
     # MuJoCo's angular velocity is in the axes of the body, half a turn about x.
     require_close(ball.twist, [1, 2, 3, 4, -5, -6])
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_twist_of_a_free_body_at_a_keyframe_is_that_of_mujoco(seed: int) -> None:
+    q, v = (np.random.default_rng(seed).uniform(-2.0, 2.0, n) for n in (8, 7))
+    key = f'qpos="{" ".join(map(repr, q.tolist()))}" qvel="{" ".join(map(repr, v.tolist()))}"'
+    text = re.sub(r'qpos="[^"]*" qvel="[^"]*"', key, KEYS)
+    compiled = mujoco.MjModel.from_xml_string(text)
+    data, twist = mujoco.MjData(compiled), np.zeros(6)
+    mujoco.mj_resetDataKeyframe(compiled, data, 0)
+    mujoco.mj_forward(compiled, data)
+    ball = compiled.body("ball").id
+    mujoco.mj_objectVelocity(compiled, data, mujoco.mjtObj.mjOBJ_XBODY, ball, twist, 0)
+    require_close(read(text, "home").body("ball").twist, [*twist[3:], *twist[:3]])
 
 
 def test_another_keyframe_is_refused(tmp_path: Path) -> None:
