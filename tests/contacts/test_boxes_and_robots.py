@@ -79,6 +79,10 @@ def test_a_pushed_cube_tips_as_its_equation_of_motion_says() -> None:
 TRIALS = [(name, trial) for name in case_names() for trial in find_case(name).trials]
 
 
+def test_cases_have_the_names_by_which_they_are_found() -> None:
+    assert [find_case(name).name for name in case_names()] == [*case_names()]
+
+
 @pytest.mark.parametrize(("name", "trial"), TRIALS)
 def test_a_trial_that_names_a_number_has_it(name: str, trial: str) -> None:
     parameters = find_case(name).trials[trial]

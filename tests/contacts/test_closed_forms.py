@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from dynx.contacts import ContactCase, Figure, find_case
-from dynx.contacts.cases import friction
+from dynx.contacts.cases import collisions, friction
 from dynx.contacts.motion import G
 from dynx.world import World
 
@@ -66,6 +66,25 @@ def test_exact_mechanics_has_no_error(name: str) -> None:
 def test_creep_on_a_slope_is_relative_to_the_speed_of_a_fall_by_the_height_of_the_box() -> None:
     (creep,) = figures(find_case("slope"), "tangent 0.4", 4e-3)
     assert creep.scale**2 / 2.0 == pytest.approx(G * friction.SLOPE_SIZE[2])
+
+
+def test_each_rebound_is_lower_by_the_square_of_the_restitution(monkeypatch: pytest.MonkeyPatch) -> None:
+    heights, dt = collisions.BOUNCING_BALL_HEIGHTS[::5], 2e-3
+    monkeypatch.setattr(collisions, "BOUNCING_BALL_HEIGHTS", heights)
+    case = find_case("bouncing_ball")
+    (trial,) = case.trials
+    # A ball turns at most half a step away from the highest state of its flight.
+    sampling = 0.5 * G * (0.5 * dt) ** 2 / min(heights)
+    for factor in (1.0, 0.95):
+        found = figures(case, trial, dt, restitution_factor=factor)
+        exact = [collisions.RESTITUTION ** (2 * n) for n in range(1, len(found) + 1)]
+        assert [figure.exact for figure in found] == exact
+        for n, figure in enumerate(found, 1):
+            # The figure is above the exact value by the deviation, whichever its sign.
+            lower = 1.0 - factor ** (2 * n)
+            assert figure.measured / figure.exact - 1.0 == pytest.approx(
+                lower, abs=sampling / figure.exact + 1e-9
+            )
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.rules.numbers_in_text import Misspelling, decimal, is_number, misspelled_number, misspelled_vector
+from dynx.model.xml.source import XmlSource
+from dynx.rules.numbers_in_text import (
+    Misspelling,
+    decimal,
+    is_number,
+    misspelled_number,
+    misspelled_vector,
+    numeric_attributes,
+)
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 decimals = numbers.map(repr).filter(lambda text: "." in text)
@@ -175,3 +185,31 @@ def test_a_comma_can_part_thousands() -> None:
     found = misspelled_number("1,250")
     assert found is not None
     assert (found.meant, found.otherwise) == ("1.250", "1250")
+
+
+SHAPES = (
+    '<box size="1 2 3"/>',
+    '<sphere radius="4"/>',
+    '<cylinder radius="5" length="6"/>',
+    '<capsule radius="7" length="8"/>',
+    '<mesh filename="a.stl" scale="9 10 11"/>',
+)
+ALL_NUMBERS = f"""<robot name="r">
+  <link name="a"><inertial><origin xyz="1 2 3" rpy="4 5 6"/><mass value="7"/>
+    <inertia ixx="8" ixy="9" ixz="10" iyy="11" iyz="12" izz="13"/></inertial>
+  {"".join(f"<visual><origin xyz='1 2 3'/><geometry>{shape}</geometry></visual>" for shape in SHAPES)}
+  {"".join(f"<collision><origin rpy='1 2 3'/><geometry>{shape}</geometry></collision>" for shape in SHAPES)}
+  </link>
+  <link name="b"/>
+  <joint name="j" type="revolute"><origin xyz="1 2 3" rpy="4 5 6"/><parent link="a"/><child link="b"/>
+    <axis xyz="7 8 9"/><limit lower="10" upper="11" effort="12" velocity="13"/>
+    <dynamics damping="14" friction="15"/><mimic joint="k" multiplier="16" offset="17"/>
+    <calibration rising="18" falling="19"/>
+    <safety_controller soft_lower_limit="20" soft_upper_limit="21" k_position="22" k_velocity="23"/></joint>
+</robot>"""
+
+
+def test_the_attributes_with_numbers_of_links_and_joints_are_numeric() -> None:
+    found = [(each.name, each.count) for each in numeric_attributes(XmlSource(ALL_NUMBERS))]
+    written = re.findall(r"""(\w+)=["']([\d ]+)["']""", ALL_NUMBERS)
+    assert sorted(found) == sorted((name, len(numbers.split())) for name, numbers in written)

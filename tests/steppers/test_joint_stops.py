@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from dynx.backends import backend, installed_backends
 from dynx.control import PD
 from dynx.errors import DivergedError
-from dynx.model import Model
+from dynx.model import Limits, Model
+from dynx.model.limited_positions import rotation_angle
 from dynx.model.loading import load
 from dynx.sim import Rollout, Scenario, Simulation, simulate, simulate_batch
 from dynx.spatial.scalar import Floats
@@ -22,6 +23,7 @@ from dynx.steppers.layout import stop_positions
 from dynx.testing.strategies import models
 from dynx.world import Scene, SceneRobot, World
 from tests.sim.bars import tutorial_robot
+from tests.sim.test_ball_joints import arm
 from tests.sim.test_compiled_loop import both
 from tests.sim.test_resume import the_same
 from tests.world.engines import WORLDS
@@ -29,6 +31,9 @@ from tests.world.engines import WORLDS
 ARM = tutorial_robot()
 NUMBERS = st.floats(-4.0, 4.0)
 MASS = backend("reference", ARM)
+LARGEST_ANGLE = 0.8
+SHOULDER = arm(limits=Limits(upper=LARGEST_ANGLE))
+SHOULDER_MASS = backend("reference", SHOULDER)
 
 
 def stopped(before: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats] | None:
@@ -110,6 +115,45 @@ def test_stops_move_no_joint_further_out_and_take_energy(data: st.DataObject) ->
         assert energy[1] <= energy[0] * (1.0 + 1e-12)
         outward = np.sign(q[base] - held[base]) * after[6 if model.floating else 0 :]
         assert (outward <= 0.0).all()
+
+
+@given(st.floats(0.01, 1.5), st.floats(0.01, 1.5), st.integers(0, 999))
+def test_a_ball_joint_stops_at_its_largest_angle_or_where_it_began(
+    begin: float, end: float, seed: int
+) -> None:
+    """The impulse is about the axis of the rotation alone, and leaves no outward velocity about it."""
+    model, rng = SHOULDER, np.random.default_rng(seed)
+    at, in_v = model.position_index("shoulder"), model.coordinate_index("shoulder")
+    axis = rng.standard_normal(3)
+    axis /= np.linalg.norm(axis)
+    before, v = model.random(rng), rng.standard_normal(model.nv)
+    q = before.copy()
+    for state, angle in ((before, begin), (q, end)):
+        quat = np.array([*(np.sin(0.5 * angle) * axis), np.cos(0.5 * angle)])
+        state[at : at + 4] = rng.choice([-1.0, 1.0]) * quat
+    most = max(LARGEST_ANGLE, begin)
+    assume(abs(end - most) > 1e-9)
+    found = JointStops(model, SHOULDER_MASS.mass_matrix)(before, q, v)
+    assert (found is None) == (end < most)
+    if found is None:
+        return
+    held, after = found
+    stopped = held[at : at + 4]
+    assert rotation_angle(stopped) == pytest.approx(most, rel=1e-14)
+    np.testing.assert_allclose(np.sign(stopped[3]) * stopped[:3], np.sin(0.5 * most) * axis, atol=1e-14)
+    np.testing.assert_array_equal(np.delete(held, range(at, at + 4)), np.delete(q, range(at, at + 4)))
+    outward = float(axis @ v[in_v : in_v + 3])
+    if outward <= 0.0:
+        np.testing.assert_array_equal(after, v)
+        return
+    M = SHOULDER_MASS.mass_matrix(held)
+    impulse = M @ (after - v)
+    scale = 1e-12 * np.abs(M).max() * np.abs(v).max()
+    assert abs(axis @ after[in_v : in_v + 3]) <= 1e-12 * np.abs(v).max()
+    along = float(axis @ impulse[in_v : in_v + 3])
+    assert along < 0.0
+    impulse[in_v : in_v + 3] -= along * axis
+    assert np.abs(impulse).max() <= scale
 
 
 def test_a_pendulum_loses_its_energy_at_its_stop_and_a_chain_shares_the_impulse() -> None:

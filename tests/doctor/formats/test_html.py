@@ -11,9 +11,18 @@ from hypothesis import strategies as st
 
 from dynx.doctor.diagnosis import compare_as_loaded
 from dynx.doctor.formats import html_page, read_baseline
-from dynx.doctor.formats.html import ALL_STEPS, SAME, Step, excerpt, step_of, template_environment
+from dynx.doctor.formats.html import (
+    ALL_STEPS,
+    SAME,
+    Step,
+    excerpt,
+    model_tables,
+    step_of,
+    template_environment,
+)
 from dynx.doctor.report import DoctorReport
 from dynx.files.lines import lines_of
+from dynx.loaded.difference import Deviation
 from dynx.rules.registry import all_rules
 from tests.doctor.formats.reports import HOSTILE, TEXT, alike, differing, hostile, refused
 from tests.files.page import Page, contrast
@@ -59,6 +68,37 @@ def test_the_page_of_one_robot_says_everything() -> None:
     wanted += [each.call for each in report.engines]
     wanted += ["dynx doctor arm.urdf", "seed 0", "DX903", "q = [0.5]", "no valid mass matrix"]
     assert [words for words in wanted if words is None or words not in page.text] == []
+
+
+def test_each_number_of_a_property_that_differs_has_a_row() -> None:
+    file = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.25], [0.0, 0.25, 3.0]]
+    other = [[1.0, 0.0, 0.5], [0.0, 2.5, 0.25], [0.5, 0.25, 3.0]]
+    third = [[1.0, 0.0, 0.75], [0.0, 2.0, 0.25], [0.75, 0.25, 3.0]]
+    found = (
+        Deviation("pybullet", "link", "tool", "inertia", file, other),
+        Deviation("drake", "link", "tool", "inertia", file, third),
+        Deviation("drake", "joint", "elbow", "axis", [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]),
+        Deviation("drake", "joint", "elbow", "axis", [0.0, 0.0, 1.0], None),
+    )
+    large, small = model_tables(replace(differing(), model_difference=found))
+    assert (large.count, small.count) == (4, 0)
+    rows = {
+        (owner, row.title): (row.file, {engine: text for engine, text in row.engine_values.items() if text})
+        for owner, each in large.owners
+        for row in each
+    }
+    numbers = {
+        place: (float(text), {engine: float(value) for engine, value in values.items()})
+        for place, (text, values) in rows.items()
+        if place[1] != "axis"
+    }
+    assert numbers == {
+        ("link tool", "iyy"): (2.0, {"pybullet": 2.5}),
+        ("link tool", "ixz"): (0.0, {"pybullet": 0.5, "drake": 0.75}),
+        ("joint elbow", "axis y"): (0.0, {"drake": 1.0}),
+        ("joint elbow", "axis z"): (1.0, {"drake": 0.0}),
+    }
+    assert rows["joint elbow", "axis"][1] == {"drake": "not there"}
 
 
 def test_each_robot_of_many_has_a_row_that_leads_to_it() -> None:

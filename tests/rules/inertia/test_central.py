@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from hypothesis import given
+from hypothesis import strategies as st
 
 from dynx.model.elements import Inertial, Pose
 from dynx.model.mechanism import pose_arrays
 from dynx.rules.inertia import CentralInertia
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
 from dynx.spatial.scalar import Array, Floats, longdouble
+from dynx.spatial.so3 import rotation_from_rpy
 from dynx.testing.strategies import inertials, poses
 
 EPS = float(np.finfo(float).eps)
@@ -64,6 +66,18 @@ def test_aligned_form_is_the_same_tensor_to_rounding(inertial: Inertial) -> None
 def test_axes_keep_their_places_where_nothing_has_to_turn() -> None:
     inertial = Inertial(2.0, Pose((0.1, 0.0, 0.0)), ixx=0.3, iyy=0.1, izz=0.25)
     assert CentralInertia.of(inertial).inertial() == inertial
+
+
+@given(st.tuples(*[st.floats(-3.1, 3.1)] * 3), st.permutations([0.1, 0.15, 0.2]))
+def test_the_axes_nearest_to_the_attitude_of_a_body_are_its_own(
+    rpy: tuple[float, float, float], moments: list[float]
+) -> None:
+    x, y, z = moments
+    body = CentralInertia.of(Inertial(2.0, Pose((0.1, 0.0, 0.0), rpy), ixx=x, iyy=y, izz=z))
+    found, axes = body.principal(rpy)
+    np.testing.assert_allclose(found, moments, rtol=4 * EPS)
+    # The gaps between the moments are a quarter of the largest, so that rounding turns no axis by more.
+    np.testing.assert_allclose(axes, rotation_from_rpy(longdouble(rpy)), rtol=0, atol=8 * EPS)
 
 
 @given(solids)

@@ -11,6 +11,7 @@ from dynx.model.elements import Inertial, Pose
 from dynx.rules.inertia import (
     ACCEPTED_MOMENT,
     CentralInertia,
+    _listed,
     fault_beyond_rounding,
     is_borderline,
     nearest_moments,
@@ -82,3 +83,12 @@ def test_a_floor_is_kept() -> None:
     raised = with_raised_moments(rod, ACCEPTED_MOMENT)
     assert raised.izz >= ACCEPTED_MOMENT
     assert raised.ixx - raised.iyy == 0.0
+
+
+@given(st.integers(1, 30))
+def test_names_that_are_not_listed_are_counted(count: int) -> None:
+    names = [f"link_{k}" for k in range(count)]
+    shown, _, more = _listed(names).partition(" and ")
+    listed = shown.split(", ")
+    assert listed == names[: len(listed)]
+    assert len(listed) + int(more.removesuffix(" more") or 0) == count
