@@ -124,6 +124,16 @@ def test_engines_are_known_and_have_versions(rule: Rule) -> None:
         assert str(SpecifierSet(versions))
 
 
+def test_each_trap_has_the_cause_of_its_rule_until_it_is_mended() -> None:
+    """Of all rules, where the tests of single rules are a sample."""
+    for rule in RULES:
+        case = trap_case(rule)
+        found = rule.detect(case)
+        assert found, rule.id
+        remedy = rule.remedy(case, found)
+        assert remedy is None or not rule.detect(remedy.case), rule.id
+
+
 @every_rule
 def test_the_trap_is_in_the_rule_alone(rule: Rule) -> None:
     case = trap_case(rule)
