@@ -30,7 +30,11 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
     "DX303": {"DX301": "a negative damping is a damping, however small"},
     "DX511": {"DX304": "followers of a follower are followers"},
     "DX512": {"DX304": "a follower that leaves its limits follows"},
-    "DX601": {"DX610": "PyBullet computes the mass from the shapes, too"},
+    "DX601": {
+        "DX610": "PyBullet computes the mass from the shapes, too",
+        "DX621": "contacts would be a cause of their own",
+        "DX622": "the class places the geom beside the origin",
+    },
     "DX608": {"DX610": "the body that has the frame has other parts than a box"},
     "DX609": {
         "DX618": "the first body is a table that is fixed",
@@ -39,6 +43,11 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
     "DX611": {"DX610": "the moments of no box are those of the file"},
     "DX613": {"DX610": "a body of another file is not looked at for a box"},
     "DX620": {"DX308": "the shapes that touch are those of a robot"},
+    "DX621": {"DX610": "a body without an inertial is not looked at for a box"},
+    "DX622": {
+        "DX308": "a geom that Pinocchio counts may touch others",
+        "DX610": "PyBullet computes the mass from the shapes, too",
+    },
     "DX618": {"DX619": "the base that is fixed floats in PyBullet"},
     "DX708": {"DX711": "what is included is named by a model"},
     "DX711": {"DX708": "a file is included"},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -785,6 +785,125 @@ class ContactsWithTheWorld(CallingRule):
                 yield found_in(
                     document, part.given, "the shape is fixed to the world, and may touch the robot"
                 )
+
+
+class MassOfGeomWithoutContacts(EditingRule):
+    """DX621 mass-of-geom-without-contacts: A geom that touches nothing has a mass, which Pinocchio leaves
+    out.
+
+    ``contype="0" conaffinity="0"`` switches the contacts of a geom off. Authors draw parts by such geoms.
+    But unless the body has an ``<inertial>``, all its geoms have a mass, also these.
+
+    - MuJoCo 4.0 and Drake 1.51 add the mass of the geom to that of the body.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) takes the geom for a mere picture, and leaves its mass out.
+    - PyBullet 3.2.7 (``loadMJCF``) ignores the attribute ``mass`` of all geoms (DX610).
+
+    The effect: the body is lighter than in MuJoCo, or has no mass.
+
+    What to do: write an ``<inertial>`` for the body. ``dynx doctor --fix`` writes it, with the numbers that
+    MuJoCo computes from the geoms. If the geom should have no mass, write ``mass="0"`` instead.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Write an <inertial> for each body, or a mass of 0 for geoms that only draw."
+    engines = measured_on("pinocchio")
+    changed = "wrote the inertia that follows from geoms"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield bodies without an inertial of their own, with such a geom."""
+        document = mjcf_text(case)
+        for body, geoms in _bodies_of_geoms(case, document):
+            found = [
+                geom
+                for geom in geoms
+                if _touches_nothing(resolved := with_defaults(document, geom, body.childclass))
+                and _has_mass(resolved)
+            ]
+            edits = _stated_inertial(case, body) if found else None
+            if edits:
+                have = "a geom of the body touches nothing, and has"
+                if len(found) > 1:
+                    have = f"{len(found)} geoms of the body touch nothing, and have"
+                yield Correction(Detection(body.name, None, found[0].line, f"{have} a mass"), tuple(edits))
+
+
+class CenterOfMassFromGeoms(EditingRule):
+    """DX622 center-of-mass-from-geoms: The centre of mass or the principal axes of a body follow from geoms,
+    which PyBullet does not compute.
+
+    Without an ``<inertial>``, the centre of mass of a body is that of its geoms.
+
+    - MuJoCo 4.0, Pinocchio 4.1 and Drake 1.51 compute the centre of mass and the inertia tensor from all
+      geoms.
+    - PyBullet 3.2.7 (``loadMJCF``) puts the centre of mass at the origin of the body. If the last geom is a
+      capsule or a cylinder with ``fromto``, it is the middle of that geom. The principal axes are those of
+      the body. The remedy of DX610 sets the mass and the moments, but cannot set the centre of mass or the
+      axes.
+
+    The effect: gravity and the inertia act at another point. A leg whose shank is a box at
+    ``pos="0 0 -0.2"`` hangs from its own centre of mass.
+
+    What to do: write an ``<inertial>`` for the body. ``dynx doctor --fix`` writes it, with the numbers that
+    MuJoCo computes from the geoms.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Write an <inertial> for each body."
+    engines = measured_on("pybullet")
+    changed = "wrote the inertia that follows from geoms"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield bodies without an inertial of their own, whose inertia is not about PyBullet's frame."""
+        document = mjcf_text(case)
+        links = {link.name: link.inertial for link in case.model.links}
+        for body, geoms in _bodies_of_geoms(case, document):
+            edits = _stated_inertial(case, body)
+            inertial = links.get(body.name or "")
+            if not edits or inertial is None:
+                continue
+            tensor, held = inertial.link_tensor, _center_in_pybullet(geoms[-1])
+            center = np.asarray(inertial.origin.xyz)
+            size = 1e-12 * float(np.trace(tensor))
+            faults = {
+                "the centre of mass": not np.allclose(center, held, rtol=1e-12, atol=1e-12),
+                "the principal axes": bool(np.any(np.abs(tensor - np.diag(np.diagonal(tensor))) > size)),
+            }
+            found = [name for name, has in faults.items() if has]
+            if found:
+                verb = "follows" if found == ["the centre of mass"] else "follow"
+                message = f"{' and '.join(found)} of the body {verb} from geoms"
+                yield Correction(Detection(body.name, None, body.element.line, message), tuple(edits))
+
+
+def _bodies_of_geoms(case: Case, document: MjcfText) -> Iterator[tuple[BodyInText, list[SourceElement]]]:
+    """Yield the bodies of the text whose inertia follows from geoms, with these geoms, unless a setting makes
+    them overrule each ``<inertial>``."""
+    if document.compiler.inertia_from_geom == "true":
+        return
+    for body in bodies_in_text(case, document):
+        geoms = body.children("geom")
+        if geoms and body.element.first("inertial") is None:
+            yield body, geoms
+
+
+def _touches_nothing(geom: Mapping[str, str]) -> bool:
+    """Check whether a geom with these attributes touches nothing but the partners of its pairs."""
+    return not any(float(geom.get(name, "1")) for name in ("contype", "conaffinity"))
+
+
+def _has_mass(geom: Mapping[str, str]) -> bool:
+    """Check whether a geom with these attributes has a mass."""
+    return geom.get("type") not in ("plane", "hfield") and bool(
+        float(geom.get("mass", geom.get("density", "1000")))
+    )
+
+
+def _center_in_pybullet(last: SourceElement) -> Floats:
+    """Return the centre of mass (3,) in PyBullet of a body whose last geom is `last`."""
+    numbers = [float(word) for word in last.attributes.get("fromto", "").split()]
+    if len(numbers) != 6 or last.attributes.get("type") not in ("capsule", "cylinder"):
+        return np.zeros(3)
+    return np.asarray((np.array(numbers[:3]) + np.array(numbers[3:])) / 2.0)
 
 
 def _fixed_bodies(document: MjcfText) -> Iterator[Element]:
