@@ -572,7 +572,7 @@ def _of_format(
         if not examiner.engines:
             raise ArgumentError(f"no engine that is installed loads {format_name(case.form)}")
     variants = variants.for_format(case.form)
-    model = model_without_mimics(case.source, case.base)
+    model = model_without_mimics(readable(case).case.source, case.base)
     if model.ball_joints:
         taking = examiner.for_ball_joints()
         for name in examiner.engines:
@@ -585,8 +585,8 @@ def _of_format(
 
 
 def open_case(robot: Robot, base: Base | None, choices: Mapping[str, str]) -> Case:
-    """Read the document of a robot as a case; raises the errors of `dynx.load`, and DescriptionError for a
-    document larger than is examined.
+    """Read the document of a robot as a case; raises the errors of `dynx.load` that no remedy of a rule about
+    the text removes, and DescriptionError for a document larger than is examined.
 
     The base of MJCF and SDF is that of the file.
     """
@@ -599,7 +599,15 @@ def open_case(robot: Robot, base: Base | None, choices: Mapping[str, str]) -> Ca
     case = Case(document, base or "fixed", choices=choices)
     if case.form == "urdf":
         return case
-    model = read_model(document.text_with_lines_before, document.source, base=base)
+    try:
+        model = read_model(document.text_with_lines_before, document.source, base=base)
+    except DescriptionError:
+        bases: Sequence[Base] = ("fixed", "floating") if base is None else (base,)
+        for each in bases:
+            stated = replace(case, base=each)
+            if readable(stated).case.readable:
+                return stated
+        raise
     return replace(case, base=model.base)
 
 

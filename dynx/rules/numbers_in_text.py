@@ -15,6 +15,7 @@ from dynx.errors import shown
 from dynx.model.elements import Vector
 from dynx.model.urdf.reader import QUATERNION, reads_quaternions, rpy_of_quaternion
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
+from dynx.model.xml.values import DECIMAL
 from dynx.rules.case import Case
 from dynx.rules.rule import Correction, EditingRule, Stage, correction
 
@@ -35,7 +36,6 @@ number, a wrong ``count``, a ``blank`` behind a single number, a ``tab`` or line
 ``infinite`` number, an ``empty`` number or vector, a ``minus`` that is not the hyphen of ASCII, an
 ``expression`` of xacro that was not expanded, a ``word`` without a number."""
 
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _GROUPED = re.compile(r"([+-]?[0-9]{1,3}(?:,[0-9]{3})+)\.[0-9]*")
 _INFINITE = re.compile(r"([+-]?)inf(?:inity)?", re.IGNORECASE)
@@ -77,7 +77,7 @@ class Misspelling:
 def is_number(text: str) -> bool:
     """Check whether every engine reads the text, without blanks around it, as one finite number."""
     word = text.strip()
-    return _NUMBER.fullmatch(word) is not None and math.isfinite(float(word))
+    return DECIMAL.fullmatch(word) is not None and math.isfinite(float(word))
 
 
 def decimal(value: float) -> str:
@@ -136,7 +136,7 @@ def _misspelled_word(word: str) -> Misspelling | None:
         return _hexadecimal(word)
     if exponent := _FORTRAN.fullmatch(word):
         return Misspelling("rest", f"{exponent.group(1)}e{exponent.group(2)}")
-    front = _NUMBER.match(word)
+    front = DECIMAL.match(word)
     if front is None or word[front.end() :].strip() not in _MEANINGLESS:
         return None
     return Misspelling("rest", front.group())
@@ -207,11 +207,24 @@ def _with_commas(words: list[str], text: str) -> Misspelling | None:
     return None
 
 
+def separated_by_blanks(text: str) -> str | None:
+    """Return numbers with blanks where their text has commas or semicolons; None where a comma may be a
+    decimal point."""
+    words = [bare for word in text.split() if (bare := word.strip(",;"))]
+    if words and all(map(is_number, words)):
+        return " ".join(words)
+    if len(words) != 1 or _GROUPED.fullmatch(words[0]) or {",", ";"} <= set(words[0]):
+        return None
+    parts = [part for part in re.split("[,;]+", words[0]) if part]
+    clear = len(parts) > 2 or ";" in words[0] or any("." in part for part in parts)
+    return " ".join(parts) if clear and all(map(is_number, parts)) else None
+
+
 def _infinite_sign(word: str) -> str:
     """Return the sign of an infinite number, written out or too large for a double; else an empty text."""
     if found := _INFINITE.fullmatch(word):
         return found.group(1) or "+"
-    if _NUMBER.fullmatch(word):
+    if DECIMAL.fullmatch(word):
         return "-" if word.startswith("-") else "+"
     return ""
 

@@ -41,6 +41,7 @@ WITHOUT_CAUSE = {
     "DX616": '    <mesh name="tetrahedron" file="dx616_part/tetrahedron.stl"/>\n',
     "DX617": '    <mesh name="absent" file="absent.obj"/>\n',
     "DX618": ' pos="0 0 1"',
+    "DX623": '  <include file="dx623_part/tip.xml"/>\n',
     "DX704": "      <pose>0.125 0 0 0 0 0</pose>\n",
     "DX705": """    <joint name="foot" type="fixed">
       <parent>world</parent>

@@ -48,6 +48,7 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
         "DX308": "a geom that Pinocchio counts may touch others",
         "DX610": "PyBullet computes the mass from the shapes, too",
     },
+    "DX623": {"DX613": "a file is included"},
     "DX618": {"DX619": "the base that is fixed floats in PyBullet"},
     "DX708": {"DX711": "what is included is named by a model"},
     "DX711": {"DX708": "a file is included"},

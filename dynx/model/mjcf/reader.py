@@ -48,7 +48,7 @@ from dynx.model.mjcf.sensor_objects import SensorObjects
 from dynx.model.mjcf.sensors import read_sensors, require_objects
 from dynx.model.mjcf.shapes import Geom, GeomReader
 from dynx.model.mjcf.tendons import read_tendons
-from dynx.model.mjcf.vocabulary import unknown_parts, unused_attributes
+from dynx.model.mjcf.vocabulary import commas_in_numbers, unknown_parts, unused_attributes
 from dynx.model.package_search import StrPath
 from dynx.model.stated_parts import (
     Actuator,
@@ -1077,7 +1077,7 @@ class _TreeReader:
 
     def _note_vocabulary(self, root: Element) -> None:
         """Add notes on attributes without an effect in dynx, and on what is misspelt."""
-        for element, text in (*unused_attributes(root), *unknown_parts(root)):
+        for element, text in (*unused_attributes(root), *unknown_parts(root), *commas_in_numbers(root)):
             self._reading.note(element, text)
 
     def _note_counts(self, root: Element) -> None:

@@ -2,15 +2,17 @@
 
 A note names those with an effect in MuJoCo. The others draw something, organise the file, or are settings of
 MuJoCo's program, and a robot is the same without them. An attribute that neither this table nor the reader
-has is misspelt.
+has is misspelt. Numbers that dynx does not read may have commas, with a note.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 
 from dynx.errors import escaped, shown
 from dynx.model.xml.reading import Element
+from dynx.model.xml.values import DECIMAL
 
 _NO_EFFECT = ""
 _SOLVER = "they are parameters of MuJoCo's solver"
@@ -207,3 +209,48 @@ def unknown_parts(root: Element) -> Iterator[tuple[Element, str]]:
         times = "" if len(elements) == 1 else f" ({len(elements)} times)"
         first = min(elements, key=lambda each: each.line)
         yield first, f"{escaped(words)} was ignored{times}"
+
+
+# -- numbers ----------------------------------------------------------------------------------------------
+
+_SEPARATORS = re.compile(r"[\s,;]+")
+_TAGS_OF_TEXT = frozenset(["text", "config"])
+_WORDS = (
+    "name class childclass model file prefix material mesh hfield texture target joint joint1 joint2 body "
+    "body1 body2 bodyname geom geom1 geom2 site site1 site2 refsite cranksite slidersite sidesite tendon "
+    "tendon1 tendon2 actuator jointinparent objname refname sensor key"
+)
+"""Attributes that hold a name, which may look like numbers."""
+
+
+def attributes_with_commas(tag: str, attributes: Mapping[str, str]) -> Iterator[str]:
+    """Yield the attributes of an element whose text is numbers with commas or semicolons.
+
+    MJCF separates numbers by white space, and MuJoCo refuses such an attribute.
+    """
+    if tag in _TAGS_OF_TEXT:
+        return
+    for name, text in attributes.items():
+        if ("," in text or ";" in text) and name not in _WORDS.split():
+            words = [word for word in _SEPARATORS.split(text) if word]
+            if words and all(map(DECIMAL.fullmatch, words)):
+                yield name
+
+
+def commas_in_numbers(root: Element) -> Iterator[tuple[Element, str]]:
+    """Yield the attributes of a document whose numbers have commas, those of one kind of element together:
+    the first element, and a sentence.
+
+    They are attributes that dynx does not read: it refuses such a text in those that it reads.
+    """
+    found: dict[tuple[str, str], list[Element]] = {}
+    waiting = [root]
+    while waiting:
+        element = waiting.pop()
+        waiting += reversed(element.children)
+        for name in attributes_with_commas(element.tag, element.attributes):
+            found.setdefault((element.tag, name), []).append(element)
+    for (tag, name), elements in found.items():
+        times = "" if len(elements) == 1 else f" ({len(elements)} times)"
+        text = shown(elements[0].attributes[name])
+        yield elements[0], f"{escaped(name)} of <{escaped(tag)}> is {text}{times}; MuJoCo refuses commas"

@@ -16,7 +16,9 @@ from dynx.model.xml.reading import Element
 MAX_NAME = 1000
 """Largest length of a name [characters]; 1,264 characters overflow PyBullet's stack."""
 
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+"""Decimal number of a description, whose match takes linear time."""
+
 _NOT_IN_XML = "\ufffe\uffff"
 _XACRO = "; xacro did not expand it"
 _WHY_IGNORED = {"loop_joint": "; the loop that it closes stays open"}
@@ -132,7 +134,7 @@ class Reading:
         self, element: Element, attribute: str, word: str, what: str, wanted: str, text: str | None = None
     ) -> float:
         word = word.strip()
-        if _NUMBER.fullmatch(word):
+        if DECIMAL.fullmatch(word):
             value = float(word)
             if math.isfinite(value):
                 return value

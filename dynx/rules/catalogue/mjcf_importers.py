@@ -10,6 +10,7 @@ import numpy as np
 from dynx.errors import shown
 from dynx.model.document_format import Format
 from dynx.model.mjcf.document import MjcfText
+from dynx.model.mjcf.vocabulary import attributes_with_commas
 from dynx.model.xml.reading import Element
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import CallingRule, Case, Correction, Detection, EditingRule, Rule, measured_on
@@ -873,6 +874,44 @@ class CenterOfMassFromGeoms(EditingRule):
                 verb = "follows" if found == ["the centre of mass"] else "follow"
                 message = f"{' and '.join(found)} of the body {verb} from geoms"
                 yield Correction(Detection(body.name, None, body.element.line, message), tuple(edits))
+
+
+class CommasOfIncludedFile(Rule):
+    """DX623 commas-of-included-file: A file that the file includes has numbers with commas, so MuJoCo refuses
+    the file.
+
+    An example is ``<site size="0.005, 0.005, 0.005"/>`` in the file of a robot, which files of scenes
+    include.
+
+    - MuJoCo 4.0 refuses the file: "bad format in attribute 'size'". DX402 describes what the other engines
+      read if the commas are in the file itself.
+    - Pinocchio 4.1 (``buildModelFromMJCF``) and PyBullet 3.2.7 (``loadMJCF``) ignore the included file
+      (DX613).
+    - Drake 1.51 refuses commas in the attributes that it reads. It ignores the elements ``<site>`` and
+      ``<custom>``.
+    - dynx refuses commas in the attributes that it reads, and writes a note about the others.
+
+    What to do: examine the included file, or correct it by hand. ``dynx doctor --fix`` does not change
+    included files.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    stated = True
+    stated_refusal = True
+    advice = "Separate the numbers of the included file only by blanks."
+    engines = measured_on("mujoco")
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the attributes of included files that have commas."""
+        document = mjcf_text(case)
+        waiting = [document.root]
+        while waiting:
+            element = waiting.pop()
+            waiting += reversed(element.children)
+            if document.reading.source_of(element) != document.reading.source:
+                for name in attributes_with_commas(element.tag, element.attributes):
+                    text = shown(element.attributes[name])
+                    yield found_in(document, element, f"{name} of <{element.tag}> is {text}")
 
 
 def _bodies_of_geoms(case: Case, document: MjcfText) -> Iterator[tuple[BodyInText, list[SourceElement]]]:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import ClassVar
 
 from dynx.errors import shown
+from dynx.model.document_format import Format
+from dynx.model.mjcf.vocabulary import attributes_with_commas
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.numbers_in_text import (
@@ -16,6 +19,7 @@ from dynx.rules.numbers_in_text import (
     misspelled_number,
     misspelled_vector,
     numeric_attributes,
+    separated_by_blanks,
     shape_attributes,
 )
 
@@ -64,28 +68,49 @@ class DecimalComma(MisspelledNumberRule):
 class CommaBetweenNumbers(MisspelledNumberRule):
     """DX402 comma-between-numbers: The numbers of a vector are separated by commas instead of blanks.
 
-    URDF separates the numbers of a vector by blanks. Other formats use commas or semicolons.
+    URDF and MJCF separate the numbers of a vector by blanks. Other formats use commas or semicolons.
 
-    - Pinocchio 4.1 refuses the file if the vector is in a ``<joint>``. In an ``<inertial>`` it drops the
-      whole inertial with a line on stderr, so the link has no mass.
+    - Pinocchio 4.1 refuses a URDF file if the vector is in a ``<joint>``. In an ``<inertial>`` it drops the
+      whole inertial with a line on stderr, so the link has no mass. In MJCF (``buildModelFromMJCF``) it reads
+      the number in front of the first comma, then 0, and takes the third from uninitialised memory.
     - PyBullet 3.2.7 reads ``1, 2, 3`` correctly, because it reads the number at the beginning of each word.
       In ``1,2,3`` it finds one word instead of three. It then prints a warning and uses zeros, so a joint is
       at the origin of its parent.
-    - MuJoCo 4.0 and Drake 1.51 refuse the file.
+    - MuJoCo 4.0 and Drake 1.51 refuse the file. In MJCF, MuJoCo also refuses commas in an attribute without
+      effect on the motion, such as the ``size`` of a ``<site>``.
+    - In MJCF, dynx refuses commas in the attributes that it reads, and writes a note about the others.
 
     The effect is a missing offset or rotation: the positions of all links beyond this place have a relative
     error of order 1. An example is ``bicycle/bike.urdf``, which comes with PyBullet.
 
     What to do: separate numbers by blanks. ``dynx doctor --fix`` writes blanks. In ``0,2 0,5 0,1`` the commas
-    are decimal separators, see DX401.
+    are decimal separators, see DX401. In MJCF, ``0,5`` may be one number or two, so ``dynx doctor --fix``
+    leaves it as it is.
     """
 
+    formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf")
     advice = "Separate the numbers of a vector only by blanks."
     engines = EVERY_ENGINE
     unambiguous = True
     changed = "separated the numbers of vectors by blanks instead of commas"
     fault = "separator"
     description = "with commas or semicolons between the numbers {meant}"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield every attribute with the fault; in MJCF also one whose commas may be decimal points."""
+        if case.form != "mjcf":
+            yield from super().corrections(case)
+            return
+        for element in case.source.root.walk():
+            for name in attributes_with_commas(element.tag, element.attributes):
+                text = element.attributes[name]
+                message = f"{name} of <{element.tag}> is {shown(text)}, with commas or semicolons"
+                meant = separated_by_blanks(text)
+                if meant is None:
+                    yield correction(element, f"{message} that may be decimal points")
+                else:
+                    edit = case.source.attribute_edit(element, name, meant)
+                    yield correction(element, f"{message} between the numbers {meant}", edit)
 
 
 class TextAfterNumber(MisspelledNumberRule):
