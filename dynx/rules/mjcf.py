@@ -54,6 +54,16 @@ def parts_of_bodies(document: MjcfText, *tags: str) -> Iterator[PartOfBody]:
         waiting += [(child, inner, body, bodies) for child in reversed(element.children)]
 
 
+def free_joints_with(document: MjcfText, attribute: str, what: str) -> Iterator[Detection]:
+    """Yield the free joints that state a coefficient other than 0, which acts on the floating base."""
+    for part in parts_of_bodies(document, "joint"):
+        numbers = part.resolved.attributes.get(attribute, "0").split()
+        if part.resolved.attributes.get("type") == "free" and any(map(float, numbers)):
+            name = part.given.attributes.get("name") or (part.body and f"{part.body}_joint")
+            message = f"the free joint has {what} {numbers[0]}"
+            yield found_in(document, part.given, message, link=part.body, joint=name)
+
+
 def found_in(document: MjcfText, element: Element, message: str, **place: str | None) -> Detection:
     """Return the detection in an element of the document; one of another file is named with that file."""
     source = document.reading.source_of(element)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from dynx.loaded import ENGINES, loader_class
+import dynx
+from dynx.loaded import ENGINES, load_as, loader_class
+from dynx.loaded.robot import call_on_joint
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
 from dynx.rules.rule import CallingRule
@@ -79,3 +83,61 @@ def test_an_armature_alone_is_kept_beside_the_damping_that_is_added() -> None:
     text = trap("DX305").source.text.replace("<dynamics/>", '<dynamics armature="0.01"/>')
     model = mended("DX305", Case(XmlSource(text)))[1].case.model
     assert model.joint("elbow").dynamics.armature == 0.01
+
+
+FREE = """<mujoco model="ball"><option OPTION/><worldbody><body name="ball">
+  <joint name="root" type="free" COEFFICIENT/>
+  <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+  <body name="arm"><joint name="elbow" type="hinge" axis="0 1 0" COEFFICIENT/>
+  <inertial pos="0.1 0 0" mass="1" diaginertia="1 1 1"/></body>
+</body></worldbody></mujoco>"""
+
+OF_FREE_JOINTS = [
+    ("DX301", "damping", "the free joint has damping 2"),
+    ("DX302", "frictionloss", "the free joint has dry friction 2"),
+    ("DX309", "armature", "the free joint has an armature of 2"),
+]
+
+
+@pytest.mark.parametrize(("rule_id", "attribute", "message"), OF_FREE_JOINTS)
+def test_what_acts_on_a_free_joint_is_named(rule_id: str, attribute: str, message: str) -> None:
+    """MuJoCo applies it to the floating base, which has no joint in dynx."""
+    text = FREE.replace("OPTION", "").replace("COEFFICIENT", f'{attribute}="2"')
+    case = Case(XmlSource(text), "floating")
+    found, remedy = mended(rule_id, case)
+    assert [(each.link, each.joint) for each in found] == [("ball", "root"), (None, "elbow")]
+    assert found[0].message == message
+    assert remedy.case.source is case.source
+    plain = text.replace(f'type="free" {attribute}="2"', f'type="free" {attribute}="0"')
+    (other,) = find_rule(rule_id).detect(Case(XmlSource(plain), "floating"))
+    assert other.joint == "elbow"
+
+
+def test_an_option_that_switches_dampers_off_leaves_no_cause() -> None:
+    text = FREE.replace("<option OPTION/>", '<option><flag damper="disable"/></option>')
+    case = Case(XmlSource(text.replace("COEFFICIENT", 'damping="2"')), "floating")
+    assert not find_rule("DX301").detect(case)
+
+
+@pytest.mark.parametrize(("rule_id", "attribute", "message"), OF_FREE_JOINTS)
+def test_a_coefficient_of_a_free_joint_is_proved(rule_id: str, attribute: str, message: str) -> None:
+    pytest.importorskip("mujoco")
+    text = FREE.replace("OPTION", "").replace("COEFFICIENT", f'{attribute}="2"')
+    text = text.replace(f'axis="0 1 0" {attribute}="2"', 'axis="0 1 0"')
+    report = dynx.diagnose(text, engines=["mujoco"], samples=1)
+    assert report.explained, report.unexplained
+    (cause,) = (each for each in report.differences if each.effect is not None)
+    assert (cause.rule, cause.link, cause.proved) == (rule_id, "ball", True)
+
+
+@pytest.mark.parametrize("call", ["mujoco.no_damping", "mujoco.no_friction", "mujoco.no_armature"])
+def test_the_call_on_a_free_joint_acts_on_its_six_velocities(call: str, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    coefficients = 'damping="2" frictionloss="3" armature="4"'
+    path = tmp_path / "ball.xml"
+    path.write_text(FREE.replace("OPTION", "").replace("COEFFICIENT", coefficients))
+    kind = {"damping": "damping", "friction": "frictionloss", "armature": "armature"}[call.partition("_")[2]]
+    with load_as("mujoco", path, dynx.load(path), [call_on_joint(call, "root")]) as robot:
+        loaded = vars(robot)["_loaded"]
+        assert not getattr(loaded, f"dof_{kind}")[:6].any()
+        assert getattr(loaded, f"dof_{kind}")[6]

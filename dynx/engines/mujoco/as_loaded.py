@@ -136,16 +136,22 @@ def _free_follower(loaded: Any, joint: int) -> None:
     loaded.eq_active0[follows] = 0
 
 
+def _dofs(loaded: Any, joint: int) -> slice:
+    """Return the velocities of a joint: six of a free joint, three of a ball joint."""
+    last = joint + 1 == loaded.njnt
+    return slice(int(loaded.jnt_dofadr[joint]), int(loaded.nv if last else loaded.jnt_dofadr[joint + 1]))
+
+
 def _disable_damping(loaded: Any, joint: int) -> None:
-    loaded.dof_damping[loaded.jnt_dofadr[joint]] = 0
+    loaded.dof_damping[_dofs(loaded, joint)] = 0
 
 
 def _disable_friction(loaded: Any, joint: int) -> None:
-    loaded.dof_frictionloss[loaded.jnt_dofadr[joint]] = 0
+    loaded.dof_frictionloss[_dofs(loaded, joint)] = 0
 
 
 def _disable_armature(loaded: Any, joint: int) -> None:
-    loaded.dof_armature[loaded.jnt_dofadr[joint]] = 0
+    loaded.dof_armature[_dofs(loaded, joint)] = 0
 
 
 def _disable_spring(loaded: Any, joint: int) -> None:

@@ -20,10 +20,19 @@ from dynx.rules import (
 )
 from dynx.rules.attributes import completion, misspelled_numbers, number_or_none, positive_edit
 from dynx.rules.joints import SINGLE, elements_in_joints, moves_by_actuator
+from dynx.rules.mjcf import free_joints_with, mjcf_text
+
+_IN_MJCF = {"damping": ("damping", "damper"), "friction": ("frictionloss", "frictionloss")}
+"""Attribute of MJCF and flag of its options for each coefficient."""
 
 
 def _stated_coefficients(case: Case, name: str, what: str) -> Iterable[Detection]:
-    """Yield the joints of MJCF or SDF that move with a coefficient that is not zero."""
+    """Yield the joints of MJCF or SDF that move with a coefficient that is not zero, free joints first."""
+    if case.form == "mjcf":
+        document = mjcf_text(case)
+        attribute, flag = _IN_MJCF[name]
+        if document.options.disabled(flag) is None:
+            yield from free_joints_with(document, attribute, what)
     for joint in case.model.joints:
         value = getattr(joint.dynamics, name)
         if joint.moves and value:
@@ -40,6 +49,7 @@ class DampingInInverseDynamics(CallingRule):
     - Pinocchio 4.1 (``rnea``) and PyBullet 3.2.7 (``calculateInverseDynamics``) do not include damping.
     - MuJoCo 4.0 (``mj_inverse``) and Drake 1.51 (``CalcInverseDynamics`` with the plant's force elements)
       include damping. This also holds for MJCF and SDF. PyBullet (``loadMJCF``) drops the damping in MJCF.
+      For a ``<joint type="free" damping="1"/>``, only MuJoCo includes the damping of the floating base.
     - Forward dynamics includes damping in PyBullet's ``stepSimulation``, in MuJoCo and in Drake, but not in
       Pinocchio's ``aba``.
 
@@ -49,7 +59,8 @@ class DampingInInverseDynamics(CallingRule):
     What to do: decide whether torques include damping. Then add ``damping * v`` to Pinocchio's torque, or
     switch damping off in the other engines. The file is correct, so ``dynx doctor --fix`` does not change the
     file. dynx returns the torque of the rigid bodies alone, unless you write ``joint_dynamics=True``. The
-    doctor compares this torque, and prints the calls that switch damping off in each engine.
+    doctor compares this torque, and prints the calls that switch damping off in each engine. A floating base
+    has no damping in dynx, with a note in ``model.notes``: write ``<freejoint/>``, which has none either.
     """
 
     formats: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf", "sdf")

@@ -8,7 +8,7 @@ from typing import ClassVar
 from dynx.errors import shown
 from dynx.model.document_format import Format
 from dynx.rules import CallingRule, Case, Detection, measured_on
-from dynx.rules.mjcf import found_in, mjcf_text, parts_of_bodies
+from dynx.rules.mjcf import found_in, free_joints_with, mjcf_text, parts_of_bodies
 
 
 class ArmatureInMassMatrix(CallingRule):
@@ -42,7 +42,9 @@ class ArmatureInMassMatrix(CallingRule):
     per_joint = False
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Yield joints that move with an armature that is not zero."""
+        """Yield joints that move with an armature that is not zero, free joints first."""
+        if case.form == "mjcf":
+            yield from free_joints_with(mjcf_text(case), "armature", "an armature of")
         for joint in case.model.joints:
             if joint.moves and joint.dynamics.armature:
                 unit = "kg m^2" if joint.type != "prismatic" else "kg"
