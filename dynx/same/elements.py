@@ -26,6 +26,7 @@ from dynx.same.observability import observability_of
 from dynx.same.placement import count_misplaced
 from dynx.same.registration import principal_frames
 from dynx.same.scales import inertia_ratio
+from dynx.same.shapes import SHAPE_KINDS, frames_of_shapes
 from dynx.same.skeleton import (
     Skeleton,
     are_alike,
@@ -252,11 +253,16 @@ def _promising(
                 before[body] = count_misplaced(found, least, body)
             if not before[body]:
                 continue
-        theirs = found.theirs if element is None else exact_skeleton(apply(changed, element.changes))
+        theirs = found.theirs
         if expected is not None:
             bodies = tuple(expected if each.theirs == body else each for each in found.bodies)
+            if element is not None and element.theirs not in theirs.number:
+                # A fixed joint moves what it carries in the body.
+                theirs = exact_skeleton(apply(changed, element.changes))
             if count_misplaced(replace(found, theirs=theirs, bodies=bodies), least, body) >= before[body]:
                 continue
+        if element is not None and theirs is found.theirs:
+            theirs = exact_skeleton(apply(changed, element.changes))
         yield element, theirs, rounded(expected.D) if element is None and expected is not None else None
         count += 1
         if count == MAX_TRIALS:
@@ -397,6 +403,7 @@ def _own_joints(analysis: Analysis, tried: set[str]) -> Iterator[_Candidate]:
         each = fits[body]
         with fifty_digits():
             frames = [each.D @ displacement for displacement in _displacements(found, each, element)]
+            frames += _frames_of_parts(found, each)
         if body == ROOT:
             if found.theirs.model.floating:
                 yield from (_Candidate(None, replace(each, D=D)) for D in frames)
@@ -414,6 +421,19 @@ def _own_joints(analysis: Analysis, tried: set[str]) -> Iterator[_Candidate]:
                 placed = _origin(found, moved, parent)
             if max(turn, shift / found.ours.reach) >= SNAP:
                 yield _Candidate(placed, moved)
+
+
+def _frames_of_parts(found: Fit, each: BodyFit) -> Iterator[Array]:
+    """Yield the poses D (4, 4) of the frame of a body with which a link of it, or the first shape of one, is
+    where its namesake is; call it inside `fifty_digits`."""
+    ours, theirs = found.ours, found.theirs
+    mine = {ours.model.links[k].name: k for k in ours.links[each.ours]}
+    for k in theirs.links[each.theirs]:
+        own = mine.get(theirs.model.links[k].name)
+        if own is not None:
+            yield ours.link_pose(own) @ inverse(theirs.link_pose(k))
+    for kind in SHAPE_KINDS:
+        yield from map(decimals, frames_of_shapes(kind, ours, theirs, each.ours, each.theirs))
 
 
 def _is_place_that_moves(model: Model, element: DifferingElement) -> bool:

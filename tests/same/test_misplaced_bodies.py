@@ -19,8 +19,8 @@ from dynx.model.elements import Joint, JointType, Limits, Link, Pose
 from dynx.same import same_robot
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
-from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
-from tests.same.planted import with_joint
+from dynx.spatial.so3 import quat_from_rotation, rotation_about, rotation_from_quat
+from tests.same.planted import with_inertial, with_joint
 from tests.same.rewrites import random_rotation, rebuilt, with_moved_frames
 from tests.same.test_named_elements import above, names, picked, random_inertial
 
@@ -175,6 +175,13 @@ def test_keyframes_tell_that_a_joint_below_a_ball_joint_is_misplaced(
     assert report.attributes == ()
 
 
+def with_camera(model: Model, before: Model, link: str, T: Floats) -> Model:
+    """Return a model with a frame at the pose T (4, 4) in a link whose frame the model before has."""
+    place = Pose.from_matrix(inverse(frame_of(model, before, link)) @ T)
+    camera = Joint("to_camera", "fixed", link, "camera", place)
+    return rebuilt(model, [*model.links, Link("camera")], [*model.joints, camera])
+
+
 @QUICK
 @given(SEEDS, SIZES, st.sampled_from(["revolute", "prismatic"]))
 def test_a_frame_tells_that_a_joint_at_a_floating_base_is_misplaced(
@@ -184,11 +191,24 @@ def test_a_frame_tells_that_a_joint_at_a_floating_base_is_misplaced(
     model = chain(rng, (kind, "revolute", "revolute"), floating=True)
     other = with_moved_frames(with_joint(model, moved_or_turned(model.joint("joint_1"), size, rng)), rng)
     T = homogeneous(random_rotation(rng), rng.uniform(-0.4, 0.4, 3))
-    texts = []
-    for each in (model, other):
-        place = Pose.from_matrix(inverse(frame_of(each, model, "link_0")) @ T)
-        camera = Joint("to_camera", "fixed", "link_0", "camera", place)
-        texts.append(rebuilt(each, [*each.links, Link("camera")], [*each.joints, camera]).to_urdf())
+    texts = [with_camera(each, model, "link_0", T).to_urdf() for each in (model, other)]
     report = same_robot(*texts, base="floating")
+    assert names(report) == [("origin", "joint_1", "joint_1")]
+    assert report.attributes == ()
+
+
+@QUICK
+@given(SEEDS, SIZES)
+def test_a_frame_tells_that_a_joint_with_a_symmetric_link_is_misplaced(seed: int, size: float) -> None:
+    rng = np.random.default_rng(seed)
+    model = chain(rng, ("revolute",), floating=False)
+    bob = replace(model.inertial("link_1"), ixx=0.1, iyy=0.1, izz=0.1, ixy=0.0, ixz=0.0, iyz=0.0)
+    model = with_inertial(model, "link_1", bob)
+    joint = model.joint("joint_1")
+    turn = homogeneous(rotation_about(np.array(joint.axis), np.asarray(size)), np.zeros(3))
+    turned = replace(joint, origin=Pose.from_matrix(joint.origin.matrix @ turn))
+    other = with_moved_frames(with_joint(model, turned), rng)
+    T = homogeneous(random_rotation(rng), rng.uniform(-0.4, 0.4, 3))
+    report = same_robot(*(with_camera(each, model, "link_1", T).to_urdf() for each in (model, other)))
     assert names(report) == [("origin", "joint_1", "joint_1")]
     assert report.attributes == ()
