@@ -49,9 +49,10 @@ def tree(rng: np.random.Generator, floating: bool, balls: bool) -> Model:
 
 
 def text_with_boxes(model: Model, before: Model, written: str) -> str:
-    """Return the text of a model with other frames, with the box of each link where `before` has it."""
+    """Return the text of a model with other frames, with the box of each link with mass where `before` has
+    it."""
     text = {"urdf": model.to_urdf, "mjcf": model.to_mjcf, "sdf": model.to_sdf}[written]()
-    for link in model.links:
+    for link in (each for each in model.links if each.inertial is not None):
         was, now = before.inertial(link.name).origin.matrix, model.inertial(link.name).origin.matrix
         place = Pose.from_matrix(now @ inverse(was) @ homogeneous(np.eye(3), np.array([0.1, 0.02, 0.03])))
         xyz, rpy = (" ".join(map(repr, each)) for each in (place.xyz, place.rpy))
@@ -211,4 +212,23 @@ def test_a_frame_tells_that_a_joint_with_a_symmetric_link_is_misplaced(seed: int
     T = homogeneous(random_rotation(rng), rng.uniform(-0.4, 0.4, 3))
     report = same_robot(*(with_camera(each, model, "link_1", T).to_urdf() for each in (model, other)))
     assert names(report) == [("origin", "joint_1", "joint_1")]
+    assert report.attributes == ()
+
+
+@QUICK
+@given(SEEDS, SIZES)
+def test_shapes_tell_how_a_link_on_a_slide_and_a_ball_joint_is_turned(seed: int, size: float) -> None:
+    rng = np.random.default_rng(seed)
+    model = chain(rng, ("revolute", "ball", "prismatic"), floating=True)
+    links = [replace(each, inertial=None) if each.name == "link_2" else each for each in model.links]
+    model = rebuilt(model, links, model.joints)
+    # Where the link is turned by half a turn, its axis is not reversed.
+    joint = model.joint("joint_3")
+    x, y, z = (-each for each in joint.axis)
+    other = with_moved_frames(with_joint(model, replace(joint, axis=(x, y, z))), rng)
+    first, second = text_with_boxes(model, model, "mjcf"), text_with_boxes(other, model, "mjcf")
+    assert same_robot(first, second).same
+    mass = other.inertial("link_3").mass
+    report = same_robot(first, second.replace(f'mass="{mass!r}"', f'mass="{(1.0 + size) * mass!r}"'))
+    assert names(report) == [("inertial", "link_3", "link_3")]
     assert report.attributes == ()
