@@ -578,8 +578,8 @@ def _of_format(
         for name in examiner.engines:
             if name not in taking.engines and (engines is not None or not taking.engines):
                 what = f"the comparison of files as {shown(name)} loads them"
-                other = "of files in MJCF, which dynx convert writes, " if case.form != "mjcf" else ""
-                refuse_ball_joints(model, what, f"that {other}as 'mujoco' loads them does")
+                taker = "'mujoco' and 'drake' load" if case.form == "mjcf" else "'drake' loads"
+                refuse_ball_joints(model, what, f"that as {taker} them does")
         examiner, variants = taking, variants.for_ball_joints()
     return examiner, variants
 

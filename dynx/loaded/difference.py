@@ -243,7 +243,7 @@ def _joint(joint: Joint, held: LoadedJoint, reach: float) -> Iterator[tuple[str,
 
 
 _KINDS = ("revolute", "continuous", "prismatic")
-_BALL_KINDS = ("ball", "spherical")
+_BALL_KINDS = ("ball", "ball_rpy", "spherical")
 
 
 def _ends(joint: Joint, held: tuple[float, float]) -> Iterator[tuple[str, Any, Any]]:

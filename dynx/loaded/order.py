@@ -12,7 +12,7 @@ locked or follow others. They also write a floating base differently:
 | `pybullet` | x, y, z, then x, y, z, w | linear and angular in axes of the world | the angle |
 
 MuJoCo has the quaternion of a ball joint as w, x, y, z, and its velocity in the axes of the child, as dynx.
-The other engines refuse robots with ball joints here.
+The other engines refuse robots with ball joints here; Drake has three angles instead of a quaternion.
 
 PyBullet has no vectors q and v. Here they are what `getBasePositionAndOrientation` and `getBaseVelocity`
 return, if the base floats, and then the joints that are not fixed, in the order of `getJointInfo`. The base

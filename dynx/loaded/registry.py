@@ -80,7 +80,7 @@ def load_as(
     loader = loader_class(engine)
     if model.ball_joints and not loader.takes_ball_joints:
         what = f"the comparison with {shown(engine)}, which loads the file itself,"
-        instead = f"'mujoco' as it loads the file does, and {BACKENDS_WITH_BALL_JOINTS}"
+        instead = f"'mujoco' and 'drake' as they load the file do, and {BACKENDS_WITH_BALL_JOINTS}"
         refuse_ball_joints(model, what, instead)
     return loader(file, model, calls)
 

@@ -1,4 +1,4 @@
-"""Ball joints of robots as MuJoCo loads them: the order of coordinates, and results in those of dynx."""
+"""Ball joints of robots as MuJoCo and Drake load them: the order of coordinates, results in those of dynx."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 import dynx
 from dynx.errors import UnsupportedFeatureError
-from dynx.loaded import load_as
+from dynx.loaded import installed_engines, load_as
 from dynx.model import JointDynamics, Limits, Model
 from tests.error_bounds import ErrorBounds, samples_at
 from tests.sim.test_ball_joints import arm, each_base
@@ -67,13 +67,16 @@ def test_locked_joints_keep_their_place(tmp_path: Path) -> None:
     assert order.velocity_from_dynx(q, v).tolist() == [1.0, 2.0, 3.0, 0.0, 4.0, 5.0, 6.0, 7.0]
 
 
+@pytest.mark.parametrize("taker", ["mujoco", "drake"])
 @each_base
-def test_results_are_in_the_coordinates_of_dynx(base: Any, tmp_path: Path) -> None:
+def test_results_are_in_the_coordinates_of_dynx(base: Any, taker: str, tmp_path: Path) -> None:
+    if taker not in installed_engines():
+        pytest.skip(f"needs {taker}")
     model = in_file(arm(base), tmp_path)
     rng = np.random.default_rng(0)
     q, (v, a) = model.random(rng), rng.uniform(-1.0, 1.0, (2, model.nv))
     bounds = ErrorBounds(samples_at(model, q, v, a))
-    with load_as("mujoco", model.source, model) as engine, dynx.backend("reference", model) as bodies:
+    with load_as(taker, model.source, model) as engine, dynx.backend("reference", model) as bodies:
         bounds.check("mass_matrix", engine.mass_matrix(q), bodies.mass_matrix(q))
         bounds.check("inverse_dynamics", engine.inverse_dynamics(q, v, a), bodies.inverse_dynamics(q, v, a))
         hand = engine.link_poses(q)[model.frame_index("hand")]
@@ -84,7 +87,15 @@ def test_results_are_in_the_coordinates_of_dynx(base: Any, tmp_path: Path) -> No
 
 def test_other_engines_refuse_by_name(tmp_path: Path) -> None:
     model = in_file(arm(), tmp_path)
-    for engine, module in (("pybullet", "pybullet"), ("pinocchio", "pinocchio"), ("drake", "pydrake")):
+    for engine, module in (("pybullet", "pybullet"), ("pinocchio", "pinocchio")):
         pytest.importorskip(module)
         with pytest.raises(UnsupportedFeatureError, match=f"'shoulder' .* the comparison with '{engine}', "):
             load_as(engine, model.source, model)
+
+
+def test_drake_has_no_order_of_ball_joints(tmp_path: Path) -> None:
+    pytest.importorskip("pydrake")
+    model = in_file(arm(), tmp_path)
+    refusal = r"'shoulder' .* the order of the coordinates of 'drake'"
+    with pytest.raises(UnsupportedFeatureError, match=refusal):
+        model.order_of("drake")

@@ -292,5 +292,5 @@ def test_a_refusal_of_ball_joints_says_what_takes_them(tmp_path: Path) -> None:
     body = '<body name="b"><joint name="ball" type="ball"/><geom size="0.1" pos="1 0 0"/></body>'
     path.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     pytest.importorskip("pinocchio")
-    with pytest.raises(UnsupportedFeatureError, match="'mujoco' as it loads the file does"):
+    with pytest.raises(UnsupportedFeatureError, match="'mujoco' and 'drake' as they load the file do"):
         dynx.load(path).order_of("pinocchio")

@@ -23,7 +23,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.engines.drake.coordinates import DrakeCoordinates
+from dynx.engines.drake.coordinates import BallJointCoordinates, DrakeCoordinates
 from dynx.engines.drake.library import (
     DRAKE_FAILURES,
     JacobianWrtVariable,
@@ -52,6 +52,7 @@ from dynx.loaded.robot import (
     require_file,
 )
 from dynx.model import Model
+from dynx.model.ball_joints import refuse_ball_joints
 from dynx.model.document_format import Format
 from dynx.model.mechanism import float64, pose_arrays
 from dynx.model.package_search import MODEL_MANIFEST
@@ -188,7 +189,8 @@ def describe_joint(joint: Any, actuator: Any | None, form: Format = "urdf") -> L
         R_child = joint.frame_on_child().GetFixedPoseInBodyFrame().rotation().matrix()
     kind = str(joint.type_name())
     if joint.num_velocities() != 1:
-        return LoadedJoint(kind, placement)
+        damping = float(joint.default_damping_vector()[0]) if kind == BALL else None
+        return LoadedJoint(kind, None if kind == BALL else placement, damping=damping)
     prismatic = kind == "prismatic"
     lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
     unbounded = not prismatic and bool(np.isinf([lower, upper]).all())
@@ -217,6 +219,9 @@ MAX_LINKS = 2000
 """Largest number of links: the time to load grows with its square, and loading cannot be interrupted."""
 
 _MOVING = ("revolute", "continuous", "prismatic")
+
+BALL = "ball_rpy"
+"""Drake's name of the type of a ball joint."""
 
 
 def require_harmless(path: Path, model: Model) -> None:
@@ -311,6 +316,7 @@ class LoadedDrake(LoadedRobot):
     name: ClassVar[str] = "drake"
     FORMATS: ClassVar[tuple[Format, ...]] = ("urdf", "mjcf", "sdf")
     CALLS: ClassVar[Mapping[str, str]] = CALLS
+    takes_ball_joints: ClassVar[bool] = True
 
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
         self._form = checked_format(type(self), path)
@@ -346,12 +352,12 @@ class LoadedDrake(LoadedRobot):
         self._places = self._find_coordinates()
         base = self._places.base
         first = None if base is None else (base.q[-1], base.v[3])
-        self._coordinates = DrakeCoordinates(
-            self._places.joints_q,
-            self._places.joints_v,
-            plant.num_positions(),
-            plant.num_velocities(),
-            first,
+        sizes = plant.num_positions(), plant.num_velocities()
+        joints_q, joints_v, balls = self._places.joints_q, self._places.joints_v, self._find_balls()
+        self._coordinates = (
+            BallJointCoordinates(joints_q, joints_v, *sizes, first, balls)
+            if balls
+            else DrakeCoordinates(joints_q, joints_v, *sizes, first)
         )
         self._torque = plant.get_applied_generalized_force_input_port()
         self._acceleration = plant.get_generalized_acceleration_output_port()
@@ -512,7 +518,12 @@ class LoadedDrake(LoadedRobot):
         return f"{nested}::{part.name()}" if nested else str(part.name())
 
     def coordinates(self) -> EngineCoordinates:
-        """Return the places of the joints in the q and v of the plant."""
+        """Return the places of the joints in the q and v of the plant.
+
+        Raises UnsupportedFeatureError for a ball joint, of which Drake has three angles instead of a
+        quaternion.
+        """
+        refuse_ball_joints(self._model, "the order of the coordinates of 'drake'", "that of 'mujoco' does")
         return self._places
 
     def _find_coordinates(self) -> EngineCoordinates:
@@ -522,7 +533,7 @@ class LoadedDrake(LoadedRobot):
         wrong = {
             name: "not there" if joint is None else str(joint.type_name())
             for name, joint in zip(model.joint_names, wanted, strict=True)
-            if joint is None or joint.num_velocities() != 1
+            if joint is None or joint.num_velocities() != (3 if model.joint(name).type == "ball" else 1)
         }
         free = {
             str(joint.child_body().name()): joint
@@ -549,11 +560,24 @@ class LoadedDrake(LoadedRobot):
         return EngineCoordinates(
             neutral,
             int(plant.num_velocities()),
-            tuple(int(joint.position_start()) for joint in joints),
-            tuple(int(joint.velocity_start()) for joint in joints),
+            tuple(int(joint.position_start()) + k for joint in joints for k in range(joint.num_positions())),
+            tuple(int(joint.velocity_start()) + k for joint in joints for k in range(joint.num_velocities())),
             (False,) * len(joints),
             base,
         )
+
+    def _find_balls(self) -> list[tuple[int, int, Floats]]:
+        """Return the index of each ball joint in q and v of dynx, and the rotation of Drake's frame on its
+        child."""
+        model = self._model
+        return [
+            (
+                model.position_index(joint.name),
+                model.coordinate_index(joint.name),
+                self._joints[joint.name].frame_on_child().GetFixedPoseInBodyFrame().rotation().matrix(),
+            )
+            for joint in model.ball_joints
+        ]
 
     def _place(self, q: Floats) -> Floats:
         """Set the configuration of the context, and return the attitude of the base."""

@@ -8,6 +8,12 @@ transpose converts forces back (virtual work). Joint coordinates only change the
 Source: Drake's documentation of `QuaternionFloatingJoint`; Featherstone, Rigid Body Dynamics Algorithms,
 section 2.10, for the two time derivatives.
 
+A ball joint of a file (`BallJointCoordinates`) has in Drake the angles (roll, pitch, yaw) of the frame M on
+the child in the frame F on the parent, and its angular velocity in the axes of F (`BallRpyJoint`); in dynx
+the quaternion of the child in its attitude at 0, and its angular velocity in its own axes. M is fixed in the
+child by R_CM, and at 0 it is F. So R_FM = R_CM' R(q) R_CM, and the angular velocity is W v, W = R_CM' R(q).
+W' W = 1, so torques are W tau; dW/dt v = W (v x v) = 0, so accelerations are W a.
+
 **In the stepper** it is a body at the centre of mass of the root, with the axes of the base frame: then a
 free body keeps its momentum. Its position is (quaternion wxyz, point), its velocity (angular, linear) in
 world axes; forces likewise. A body of a scene is a floating base.
@@ -126,6 +132,62 @@ class DrakeCoordinates:
         if self._floating:
             x = np.concatenate([(x[:6].reshape(2, 3) @ R.T).ravel(), x[6:]])
         return (np.append(x, 0.0) if self._pad_v else x)[self._from_v]
+
+
+class BallJointCoordinates(DrakeCoordinates):
+    """The map for a tree with ball joints, each of which has three entries in q and in v of the plant.
+
+    `balls` has the index of each ball joint in q and in v of dynx, and the rotation R_child_M (3, 3) of its
+    frame on the child, in tree order. `attitude` returns R_world_base, or zeros for a fixed base, and the
+    matrices W of the joints: (1 + number of them, 3, 3).
+    """
+
+    def __init__(
+        self,
+        q_index: Sequence[int],
+        v_index: Sequence[int],
+        n_q: int,
+        n_v: int,
+        base: tuple[int, int] | None,
+        balls: Sequence[tuple[int, int, Floats]],
+    ) -> None:
+        super().__init__(q_index, v_index, n_q, n_v, base)
+        self._same = False
+        self._balls = balls
+
+    def attitude(self, q: Floats) -> Floats:
+        """Return the rotations of the base and of the ball joints."""
+        base = super().attitude(q) if self._floating else np.zeros((3, 3))
+        turned = [R_CM.T @ rotation_from_quat(q[at : at + 4]) for at, _, R_CM in self._balls]
+        return np.array([base, *turned])
+
+    def positions(self, q: Floats) -> Floats:
+        """Return the plant's q at the configuration `q` of dynx."""
+        parts, done = [], 0
+        for at, _, R_CM in self._balls:
+            R_FM = R_CM.T @ rotation_from_quat(q[at : at + 4]) @ R_CM
+            parts += [q[done:at], _roll_pitch_yaw(R_FM)]
+            done = at + 4
+        return super().positions(np.concatenate([*parts, q[done:]]))
+
+    def forces_back(self, R: Floats, force: Floats) -> Floats:
+        """Return the torque of dynx for the plant's generalized force, or for rows of a matrix (..., n_v)."""
+        out = super().forces_back(R[0], force)
+        for (_, at, _), W in zip(self._balls, R[1:], strict=True):
+            out[..., at : at + 3] = out[..., at : at + 3] @ W
+        return out
+
+    def _to_plant(self, R: Floats, x: Floats) -> Floats:
+        x = x.copy()
+        for (_, at, _), W in zip(self._balls, R[1:], strict=True):
+            x[at : at + 3] = W @ x[at : at + 3]
+        return super()._to_plant(R[0], x)
+
+
+def _roll_pitch_yaw(R: Floats) -> Floats:
+    """Return the angles (3,) of a rotation about x, then y, then z, all in fixed axes."""
+    (xx, _, _), (yx, _, _), (zx, zy, zz) = R.tolist()
+    return np.array([np.arctan2(zy, zz), np.arctan2(-zx, np.hypot(zy, zz)), np.arctan2(yx, xx)])
 
 
 def _gather(indices: Sequence[int], length: int) -> tuple[Array, bool]:
