@@ -44,6 +44,10 @@ ALSO_IN_TRAP: dict[str, dict[str, str]] = {
     "DX613": {"DX610": "a body of another file is not looked at for a box"},
     "DX620": {"DX308": "the shapes that touch are those of a robot"},
     "DX621": {"DX610": "a body without an inertial is not looked at for a box"},
+    "DX624": {
+        "DX308": "a geom that Pinocchio counts may touch others",
+        "DX610": "PyBullet computes the mass from the shapes, too",
+    },
     "DX622": {
         "DX308": "a geom that Pinocchio counts may touch others",
         "DX610": "PyBullet computes the mass from the shapes, too",

@@ -40,6 +40,7 @@ WRONG_FOR_SECOND_CAUSE: dict[tuple[str, str], str] = {
     ("DX708", "drake"): "DX711: the file that is included is named by a model",
     ("DX711", "pybullet"): "DX708: a file is included",
     ("DX720", "pybullet"): "DX708: a file is included",
+    ("DX624", "pybullet"): "DX610: the mass is that of the shapes, without this one",
     ("DX716", "pybullet"): "DX709: several links are the child of no joint",
 }
 

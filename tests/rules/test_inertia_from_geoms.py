@@ -100,9 +100,31 @@ def test_the_centre_of_mass_from_geoms(geoms: str, message: str | None) -> None:
         mended("DX622", case)
 
 
+@pytest.mark.parametrize(
+    ("geom", "message"),
+    [
+        ('<geom type="box" size="0.1" fromto="0 0 0 0 0 0.4"/>', "a geom is a box between two points"),
+        (
+            '<geom type="ellipsoid" size="0.1" fromto="0 0 0 0 0 0.4"/>',
+            "a geom is an ellipsoid between two points",
+        ),
+        ('<geom type="box" size="0.1" fromto="0 0 0 0 0 0.4" mass="0"/>' + CAPSULE, None),
+        (CAPSULE, None),
+        (BOX, None),
+    ],
+)
+def test_a_box_between_points(geom: str, message: str | None) -> None:
+    case = arm(geom)
+    assert [each.message for each in find_rule("DX624").detect(case)] == (
+        [] if message is None else [message]
+    )
+    if message is not None:
+        mended("DX624", case)
+
+
 def test_geoms_that_overrule_inertials_are_left() -> None:
     text = ARM.replace("GEOMS", BOX).replace("<default>", '<compiler inertiafromgeom="true"/><default>', 1)
-    for rule in ("DX621", "DX622"):
+    for rule in ("DX621", "DX622", "DX624"):
         assert not find_rule(rule).detect(Case(XmlSource(text)))
 
 

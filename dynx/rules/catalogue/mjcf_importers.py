@@ -914,6 +914,45 @@ class CommasOfIncludedFile(Rule):
                     yield found_in(document, element, f"{name} of <{element.tag}> is {text}")
 
 
+class BoxBetweenPoints(EditingRule):
+    """DX624 box-between-points: A box or an ellipsoid extends between two points, and Drake leaves its mass
+    out.
+
+    ``<geom type="box" size="0.02" fromto="0 0 0 0 0 0.4"/>`` is a box whose axis z goes from one point to the
+    other.
+
+    - MuJoCo 4.0 and Pinocchio 4.1 (``buildModelFromMJCF``) read ``fromto`` of capsules, cylinders, boxes and
+      ellipsoids.
+    - Drake 1.51 reads it of capsules and cylinders. It ignores other geoms that have it, with a warning ("The
+      fromto tag for box is currently unsupported").
+    - PyBullet 3.2.7 (``loadMJCF``) also reads no box or ellipsoid of this kind (DX610, DX622).
+
+    The effect: unless the body has an ``<inertial>``, it lacks the mass of the geom.
+
+    What to do: write an ``<inertial>`` for the body, or write ``pos``, ``quat`` and three sizes.
+    ``dynx doctor --fix`` writes the ``<inertial>``, with the numbers that MuJoCo computes from the geoms.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Write an <inertial> for each body."
+    engines = measured_on("drake")
+    changed = "wrote the inertia that follows from geoms"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield bodies without an inertial of their own, with such a geom."""
+        document = mjcf_text(case)
+        for body, geoms in _bodies_of_geoms(case, document):
+            for geom in geoms:
+                resolved = with_defaults(document, geom, body.childclass)
+                kind = resolved.get("type", "sphere")
+                if kind not in ("box", "ellipsoid") or "fromto" not in resolved or not _has_mass(resolved):
+                    continue
+                if edits := _stated_inertial(case, body):
+                    message = f"a geom is a{'n' if kind == 'ellipsoid' else ''} {kind} between two points"
+                    yield Correction(Detection(body.name, None, geom.line, message), tuple(edits))
+                break
+
+
 def _bodies_of_geoms(case: Case, document: MjcfText) -> Iterator[tuple[BodyInText, list[SourceElement]]]:
     """Yield the bodies of the text whose inertia follows from geoms, with these geoms, unless a setting makes
     them overrule each ``<inertial>``."""
