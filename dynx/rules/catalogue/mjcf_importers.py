@@ -953,6 +953,40 @@ class BoxBetweenPoints(EditingRule):
                 break
 
 
+class BaseWithoutName(EditingRule):
+    """DX625 base-without-name: The floating base has no name, so some engines give it a name of their own.
+
+    Names of bodies are optional in MJCF. Examples often leave them out.
+
+    - MuJoCo 4.0 gives the body only a number. Pinocchio 4.1 (``buildModelFromMJCF``) has one floating base,
+      whatever its name is.
+    - Drake 1.51 and PyBullet 3.2.7 (``loadMJCF``) give the body names of their own. ``loadMJCF`` returns
+      several bodies, for example a floor and the robot.
+
+    A program cannot find the body by the same name in two engines. The doctor does not use an engine in which
+    it does not find the floating base. In PyBullet, the doctor also finds a robot by the names of its joints.
+
+    What to do: name every body. ``dynx doctor --fix`` writes the name that dynx gives the base.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    trap_base = "floating"
+    advice = "Name every body."
+    engines = measured_on("drake", "pybullet")
+    changed = "named the floating base"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield a floating base without a name."""
+        document = mjcf_text(case)
+        for body in bodies_in_text(case, document):
+            element = body.element
+            if "name" in element.attributes or not case.model.floating or body.name != case.model.root:
+                continue
+            message = "the floating base has no name"
+            edit = case.source.attribute_edit(element, "name", body.name)
+            yield Correction(Detection(body.name, None, element.line, message), (edit,))
+
+
 def _bodies_of_geoms(case: Case, document: MjcfText) -> Iterator[tuple[BodyInText, list[SourceElement]]]:
     """Yield the bodies of the text whose inertia follows from geoms, with these geoms, unless a setting makes
     them overrule each ``<inertial>``."""
