@@ -336,11 +336,19 @@ def _filter(robot: Robot, rng: np.random.Generator, size: float) -> Planted:
         # MuJoCo tests no shapes of one body, or of two that a joint connects: a filter is nothing there.
         apart = {name: robot.body(name) | _beside(robot, name) for name in names}
         there = [set(pair) for pair in robot.exclusions]
+        # Nor does it filter the shapes of a contact pair.
+        paired = [{id(one), id(two)} for one, two in robot.contacts]
         pairs = [
             (a, b)
             for a in names
             for b in names
             if a < b and b not in apart[a] and "world" not in (a, b) and {a, b} not in there
+            if any(
+                {id(one), id(two)} not in paired
+                for one in robot.links[a].shapes
+                for two in robot.links[b].shapes
+                if not (one.visual or two.visual)
+            )
         ]
         pair = _pick(rng, pairs)
         robot.exclusions.append(pair)

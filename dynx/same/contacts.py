@@ -83,7 +83,8 @@ def contact_differences(
 ) -> Iterator[Attribute | DescriptionFreedom]:
     """Yield which shapes may touch in one description alone; nothing where one of them leaves it open.
 
-    Compared are shapes that both robots have. An exclusion of shapes that touch in neither is a freedom.
+    Compared are shapes that both robots have. An exclusion that changes no contact is a freedom: of shapes
+    that do not touch anyway, or that touch as a pair.
     """
     if ours.contact_filter is None or theirs.contact_filter is None:
         return
@@ -174,7 +175,7 @@ def _pair_differences(
                 a, b = (*sorted(links), *links)[:2]
                 where = ("first", "second")[side]
                 yield DescriptionFreedom(
-                    "contacts", a, b, f"the {where} excludes {a} and {b}, which touch in neither description"
+                    "contacts", a, b, f"the {where} excludes {a} and {b}, which changes no contact"
                 )
 
 

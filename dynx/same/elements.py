@@ -450,7 +450,7 @@ def _followed(found: Fit, body: int) -> Array:
 
 def _displacements(found: Fit, here: BodyFit, element: DifferingElement) -> Iterator[Array]:
     """Yield the displacements (4, 4), in a body whose fit is `here`, that make an element of it right: of a
-    link both by its frame and by its inertia, in case its frame is moved."""
+    link by its frame, and in case its frame is moved by its shapes and by its inertia."""
     ours, theirs = found.ours, found.theirs
     fits = {each.theirs: each for each in found.bodies}
     back = inverse(here.D)
@@ -465,6 +465,10 @@ def _displacements(found: Fit, here: BodyFit, element: DifferingElement) -> Iter
         for skeleton, name in ((theirs, element.theirs), (ours, element.ours))
     )
     yield back @ wanted @ inverse(now)
+    if element.ours == element.theirs:
+        for kind in SHAPE_KINDS:
+            for D in frames_of_shapes(kind, ours, theirs, here.ours, here.theirs, element.ours):
+                yield back @ decimals(D)
     mine = ours.heavy_links[here.ours].get(element.ours)
     other = theirs.heavy_links[here.theirs].get(element.theirs)
     if mine is None or other is None or not (float(mine.mass) > 0.0 and float(other.mass) > 0.0):

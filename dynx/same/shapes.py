@@ -94,16 +94,18 @@ def matched_shapes(
     return MatchedShapes(pairs, alone, left)
 
 
-def frames_of_shapes(kind: ShapeKind, ours: Skeleton, theirs: Skeleton, a: int, b: int) -> Iterator[Floats]:
+def frames_of_shapes(
+    kind: ShapeKind, ours: Skeleton, theirs: Skeleton, a: int, b: int, link: str | None = None
+) -> Iterator[Floats]:
     """Yield the poses (4, 4) that the frame of body b has in that of body a where the first shape of a link
-    stands where the first one of its namesake does, if both are alike."""
+    stands where the first one of its namesake does, if both are alike: of each link, or of one `link`."""
     firsts = [
         {each.number[0]: each for each in reversed(_shapes(kind, skeleton, body, np.eye(4))) if each.number}
         for skeleton, body in ((ours, a), (theirs, b))
     ]
     for name, mine in firsts[0].items():
         other = firsts[1].get(name)
-        if other is not None and mine.is_as_large(other, ROUNDED):
+        if link in (None, name) and other is not None and mine.is_as_large(other, ROUNDED):
             yield mine.T @ inverse(other.T)
 
 
