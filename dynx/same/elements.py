@@ -229,7 +229,7 @@ def _with_fixed_joints(
     return best
 
 
-class _Candidate(NamedTuple):
+class _CandidatePlace(NamedTuple):
     """A place of a joint that may explain what differs, or with None another frame of a floating base. If it
     explains no fewer elements, `expected` is how its body fits then: it is better only if more stands at its
     place in that body."""
@@ -239,7 +239,7 @@ class _Candidate(NamedTuple):
 
 
 def _promising(
-    candidates: Iterable[_Candidate], found: Fit, changed: Model, tolerance: float
+    candidates: Iterable[_CandidatePlace], found: Fit, changed: Model, tolerance: float
 ) -> Iterator[tuple[DifferingElement | None, Skeleton, Floats | None]]:
     """Yield the candidates that may be a better explanation, `MAX_TRIALS` at most, with the robot that has
     them, and with the frame (4, 4) of its floating base if that is the candidate."""
@@ -297,7 +297,7 @@ def _analysed(
 
 def _fixed_joints(
     analysis: Analysis, ours: Model, tried: set[str], *, any_single: bool
-) -> Iterator[_Candidate]:
+) -> Iterator[_CandidatePlace]:
     """Yield fixed joints of `theirs`, in document order, below which elements differ, each placed so that the
     first joint or the first inertia of these does not.
 
@@ -322,7 +322,7 @@ def _fixed_joints(
 
     def placed(
         joint: Joint, elements: list[DifferingElement], *, beside: bool, single: bool
-    ) -> Iterator[_Candidate]:
+    ) -> Iterator[_CandidatePlace]:
         here = fits[found.theirs.body_of[joint.child]]
         # The place of a joint says exactly where its parent is, whatever the frames of links.
         joints, links = ([each for each in elements if each.tag == tag] for tag in ("joint", "link"))
@@ -335,7 +335,7 @@ def _fixed_joints(
             for displacement, D in zip(displacements, frames, strict=True):
                 other = _placed(found, mine.get(joint.name), joint, displacement)
                 if other is not None:
-                    yield _Candidate(other, replace(here, D=D) if single else None)
+                    yield _CandidatePlace(other, replace(here, D=D) if single else None)
 
     written_otherwise = [
         joint
@@ -361,7 +361,7 @@ def _fixed_joints(
             for displacement in displacements:
                 other = _placed(found, mine.get(joint.name), joint, displacement)
                 if other is not None:
-                    yield _Candidate(other, None)
+                    yield _CandidatePlace(other, None)
     for joint in [joint for joint in model.joints if joint.name in below and joint.name not in tried]:
         # What is written as in the other description is not at fault; what has no counterpart there may be
         # if several elements, or the place of a joint, depend on it.
@@ -385,7 +385,7 @@ def _fixed_joints(
             yield from placed(joint, elements, beside=True, single=not several)
 
 
-def _own_joints(analysis: Analysis, tried: set[str]) -> Iterator[_Candidate]:
+def _own_joints(analysis: Analysis, tried: set[str]) -> Iterator[_CandidatePlace]:
     """Yield the joints that move the bodies of which an inertia or the place of a joint differs, each placed
     so that it does not; of a floating base its frame."""
     found = analysis.fit
@@ -406,7 +406,7 @@ def _own_joints(analysis: Analysis, tried: set[str]) -> Iterator[_Candidate]:
             frames += _frames_of_parts(found, each)
         if body == ROOT:
             if found.theirs.model.floating:
-                yield from (_Candidate(None, replace(each, D=D)) for D in frames)
+                yield from (_CandidatePlace(None, replace(each, D=D)) for D in frames)
             continue
         joint = found.theirs.joints[body]
         # What turns on a ball joint is turned as it fits best.
@@ -420,7 +420,7 @@ def _own_joints(analysis: Analysis, tried: set[str]) -> Iterator[_Candidate]:
                 moved = replace(each, D=D, turn=turn, shift=shift)
                 placed = _origin(found, moved, parent)
             if max(turn, shift / found.ours.reach) >= SNAP:
-                yield _Candidate(placed, moved)
+                yield _CandidatePlace(placed, moved)
 
 
 def _frames_of_parts(found: Fit, each: BodyFit) -> Iterator[Array]:
