@@ -110,7 +110,6 @@ REFUSED: dict[str, Callable[[Path], object]] = {
         [Q, MODEL.neutral()], velocity=1.0, acceleration=1.0, model=MODEL
     ),
     "agree with PyBullet": lambda folder: raised(dynx.agree(MODEL, ["reference", "pybullet"])),
-    "diagnose with Drake": of_file(lambda path: raised(dynx.diagnose(path, engines=["drake"]))),
     "load_as Pinocchio": of_file(loaded),
     "a world on PyBullet": lambda folder: world_on("pybullet"),
     "a world on Drake": lambda folder: world_on("drake"),

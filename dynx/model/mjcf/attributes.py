@@ -112,6 +112,10 @@ def new_document(name: str) -> Element:
 
 def document_text(root: Element, remarks: Iterable[str] = ()) -> str:
     """Return a document as text, one element a line, with remarks as comments at its beginning."""
+    # Drake and Pinocchio refuse bodies without an inertia in a document that says that shapes have none.
+    if all(body.find("inertial") is not None or body.find("geom") is None for body in root.iter("body")):
+        for compiler in root.findall("compiler"):
+            compiler.attrib.pop("inertiafromgeom", None)
     indent(root)
     # A comment cannot have two hyphens in a row.
     lines = [f"<!-- {re.sub('-(?=-)', '- ', remark)} -->\n" for remark in remarks]

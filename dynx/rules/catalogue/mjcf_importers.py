@@ -987,6 +987,40 @@ class BaseWithoutName(EditingRule):
             yield Correction(Detection(body.name, None, element.line, message), (edit,))
 
 
+class InertiaNowhere(EditingRule):
+    """DX626 inertia-nowhere: A body states no inertia and has no geoms, so some engines refuse the file.
+
+    With ``<compiler inertiafromgeom="false"/>`` only an ``<inertial>`` gives a body mass. A body that serves
+    as a frame needs no mass, and often has no ``<inertial>``.
+
+    - MuJoCo 4.0 and PyBullet 3.2.7 (``loadMJCF``) read the file.
+    - Drake 1.51 refuses it: "has no inertial tag and inertiafromgeom=false. You must specify an inertia".
+      Pinocchio 4.1 (``buildModelFromMJCF``) refuses it: "Cannot get inertia from geom and no inertia was
+      found".
+
+    What to do: leave the setting out if every body with geoms has an ``<inertial>``. It has no effect then.
+    ``dynx doctor --fix`` writes ``inertiafromgeom="auto"``, the default. If a body without an ``<inertial>``
+    has geoms, write an ``<inertial>`` for each body.
+    """
+
+    formats: ClassVar[tuple[Format, ...]] = ("mjcf",)
+    advice = "Leave out inertiafromgeom, or write an <inertial> for each body."
+    engines = measured_on("pinocchio", "drake")
+    changed = 'wrote inertiafromgeom="auto"'
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the setting, if every body with geoms has an inertial of its own and another has none."""
+        document = mjcf_text(case)
+        without = [each for each in bodies_in_text(case, document) if each.element.first("inertial") is None]
+        if not without or any(each.children("geom") for each in without):
+            return
+        for element in case.source.root.children:
+            if element.tag == "compiler" and element.attributes.get("inertiafromgeom") == "false":
+                message = f"body {without[0].name!r} has no inertial and no geom"
+                edit = case.source.attribute_edit(element, "inertiafromgeom", "auto")
+                yield Correction(Detection(None, None, element.line, message), (edit,))
+
+
 def _bodies_of_geoms(case: Case, document: MjcfText) -> Iterator[tuple[BodyInText, list[SourceElement]]]:
     """Yield the bodies of the text whose inertia follows from geoms, with these geoms, unless a setting makes
     them overrule each ``<inertial>``."""

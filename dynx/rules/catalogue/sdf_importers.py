@@ -992,7 +992,7 @@ class MasslessLinkOfSdf(EditingRule):
     advice = "Connect a base that does not move to the world by a fixed joint, or enter the mass."
     choices: ClassVar[Mapping[str, str]] = {
         "least": "give the link the least mass that engines accept",
-        "keep": "keep the file; PyBullet fixes a root without mass, and Drake gives moments 1 kg",
+        "keep": "keep the file; engines fix a root without mass, or give moments a mass of 1 kg",
     }
     engines = measured_on("drake", "pybullet")
     changed = f"gave links without mass {decimal(LEAST_MASS)} kg"
